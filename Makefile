@@ -1,0 +1,51 @@
+# `make demo` and `make test` need nothing but python3 >= 3.11 (Debian: apt-get install python3-venv make).
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+ARGS ?=
+
+.PHONY: help setup demo test lint lock schemas bench clean
+
+help:
+	@echo "make demo     two feet tracked on simulated hardware (options: make demo ARGS='--seconds 30 --task line')"
+	@echo "make test     lint, types, import directions and the whole test suite"
+	@echo "make lint     ruff, mypy --strict, import directions"
+	@echo "make bench    latency and throughput beside their floors"
+	@echo "make schemas  regenerate protocol/schema, protocol/vectors and the tables in SPEC.md"
+	@echo "make lock     resolve the dependencies anew (needs uv)"
+
+setup: $(STAMP)
+
+$(STAMP): requirements-dev.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "foottrack needs python3 >= 3.11; this is $$($(PYTHON) --version). Try: make PYTHON=python3.11 $(MAKECMDGOALS)"; exit 1; }
+	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || { echo "python3 lacks venv. On Debian: apt-get install python3-venv"; exit 1; }
+	@echo "Setting up $(VENV) from requirements-dev.lock (once, a minute or so) ..."
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+demo: setup
+	$(BIN)/foottrack demo $(ARGS)
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: lint
+	$(BIN)/pytest $(ARGS)
+
+bench: setup
+	$(BIN)/foottrack bench $(ARGS)
+
+schemas: setup
+	$(BIN)/python -m foottrack_protocol.generate
+
+lock:
+	uv pip compile --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 pyproject.toml --group dev --extra realsense -o requirements-dev.lock
+
+clean:
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis build dist

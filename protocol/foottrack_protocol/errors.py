@@ -1,0 +1,52 @@
+"""What can go wrong on the wire.
+
+::
+
+    ProtocolError
+    ├── TopicError      a topic's name is not one of ours
+    ├── EncodeError     a message that must not be sent (NaN, wrong body for its topic, too large)
+    └── DecodeError     bytes that are not a message; ``reason`` says why, and is what receivers count by
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Reason(StrEnum):
+    """Why bytes were not a message. The values appear in ``sys/health`` as the keys of ``drops``."""
+
+    FRAMES = "frames"
+    TOPIC = "topic"
+    OVERSIZED = "oversized"
+    MSGPACK = "msgpack"
+    DEPTH = "depth"
+    ENVELOPE = "envelope"
+    VERSION = "version"
+    NOT_FINITE = "not_finite"
+    BODY = "body"
+
+
+class ProtocolError(Exception):
+    """Base of all errors of this package."""
+
+
+class TopicError(ProtocolError):
+    """The topic is malformed or names no known stream."""
+
+
+class EncodeError(ProtocolError):
+    """The message may not be sent."""
+
+
+class DecodeError(ProtocolError):
+    """The bytes are not a message of this protocol.
+
+    Attributes: ``reason`` (what receivers count by), ``topic`` (as far as it could be read, else None).
+    """
+
+    def __init__(self, reason: Reason, detail: str, topic: str | None = None) -> None:
+        super().__init__(f"{reason}: {detail}" + (f" (topic {topic})" if topic else ""))
+        self.reason = reason
+        self.detail = detail
+        self.topic = topic
