@@ -1,0 +1,1 @@
+"""Pictures of walking feet, drawn: what the simulated camera sees. Ships with the product (demo, tests, evaluation)."""
