@@ -2,10 +2,13 @@
 
 Quaternions are ``[x, y, z, w]`` (float64), unit, and turn vectors of the body's frame into its parent's:
 ``v_parent = rotate(q, v_body)``. All functions broadcast over leading axes, so one quaternion of shape (4,)
-and a track of shape (n, 4) go through the same code. Tested against ``scipy.spatial.transform.Rotation``.
+and a track of shape (n, 4) go through the same functions; the products that every sample needs take a path of plain
+floats for one quaternion, which is ten times as fast. Tested against ``scipy.spatial.transform.Rotation``.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,17 +31,11 @@ def normalised(q: npt.ArrayLike) -> Array:
 def multiply(a: npt.ArrayLike, b: npt.ArrayLike) -> Array:
     """Hamilton product a b, shapes (..., 4): first b turns, then a."""
     a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    if a.ndim == 1 and b.ndim == 1:
+        return np.array(_product(*a.tolist(), *b.tolist()))
     ax, ay, az, aw = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
     bx, by, bz, bw = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
-    return np.stack(
-        [
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        ],
-        axis=-1,
-    )
+    return np.stack(_product(ax, ay, az, aw, bx, by, bz, bw), axis=-1)
 
 
 def conjugate(q: npt.ArrayLike) -> Array:
@@ -50,10 +47,10 @@ def conjugate(q: npt.ArrayLike) -> Array:
 def rotate(q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
     """Vector(s) v, shape (..., 3), turned by q, shape (..., 4)."""
     q, v = np.asarray(q, dtype=np.float64), np.asarray(v, dtype=np.float64)
-    u, w = q[..., :3], q[..., 3:]
-    t = 2.0 * np.cross(u, v)
-    turned: Array = v + w * t + np.cross(u, t)
-    return turned
+    if q.ndim == 1 and v.ndim == 1:
+        return np.array(_turned(*q.tolist(), *v.tolist()))
+    qx, qy, qz, qw = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    return np.stack(_turned(qx, qy, qz, qw, v[..., 0], v[..., 1], v[..., 2]), axis=-1)
 
 
 def unrotate(q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
@@ -152,3 +149,21 @@ def continuous(q: npt.ArrayLike) -> Array:
     signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))
     q[1:] *= signs[:, None]
     return q
+
+
+def _product(ax: Any, ay: Any, az: Any, aw: Any, bx: Any, by: Any, bz: Any, bw: Any) -> tuple[Any, ...]:
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def _turned(qx: Any, qy: Any, qz: Any, qw: Any, vx: Any, vy: Any, vz: Any) -> tuple[Any, ...]:
+    tx, ty, tz = 2.0 * (qy * vz - qz * vy), 2.0 * (qz * vx - qx * vz), 2.0 * (qx * vy - qy * vx)
+    return (
+        vx + qw * tx + qy * tz - qz * ty,
+        vy + qw * ty + qz * tx - qx * tz,
+        vz + qw * tz + qx * ty - qy * tx,
+    )

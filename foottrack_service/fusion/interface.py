@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal, Protocol
 
+from foottrack_service.config import Placement
 from foottrack_service.rotations import Array
 
 Kind = Literal["marker", "depth"]
@@ -103,6 +104,9 @@ class FootEstimate:
 class FootFilter(Protocol):
     """One foot's filter."""
 
+    waits_for_head: bool
+    """Whether a fix is held back until the head pose at its own instant is known."""
+
     def on_imu(self, sample: ImuSample) -> None:
         """Take a sample, in order of arrival."""
 
@@ -111,6 +115,12 @@ class FootFilter(Protocol):
 
     def on_floor(self, height: float) -> None:
         """The floor is at this height in the stage, m."""
+
+    def on_imu_yaw(self, yaw: float) -> None:
+        """The yaw of the device's own frame in the stage was calibrated, rad."""
+
+    def on_imu_placement(self, placement: Placement) -> None:
+        """The sensor's place on the shoe was calibrated."""
 
     def on_recentred(self, p: Array | None, q: Array | None) -> None:
         """The stage moved by the rigid motion old to new, or by an unknown one (None: re-acquire)."""

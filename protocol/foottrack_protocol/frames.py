@@ -9,6 +9,7 @@ its face.
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 STANDARD_GRAVITY = 9.80665
 """m/s^2."""
@@ -20,7 +21,7 @@ FORWARD = (0.0, 0.0, -1.0)
 TAG_ON_INSTEP = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 """Rotation tag to foot of a tag that lies flat on the instep with its top towards the toes."""
 
-SIDES = ("left", "right")
+SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
 
 MAX_HEAD_GAP_S = 0.1
 """The head pose is interpolated between tracked poses at most this far apart, never across a hole."""

@@ -1,0 +1,49 @@
+"""Lengths of the user's bones, scaled from the height unless given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from foottrack_protocol.messages import BodyValues
+from foottrack_service.config import BodySettings
+
+# Shares of the standing height: R. Drillis and R. Contini, Body Segment Parameters, NYU 1966, as tabulated in
+# D. Winter, Biomechanics and Motor Control of Human Movement. The eyes, where the headset sits, are at 0.936.
+_THIGH = 0.245
+_SHANK = 0.246
+_HIP_HEIGHT = 0.530
+_EYE_HEIGHT = 0.936
+_HIP_WIDTH = 0.191 * 0.53
+"""Hip joints sit at about half of the pelvis's outer breadth (0.191 of the height)."""
+_HIP_BACK = 0.05
+"""The hips' centre lies about 9 cm behind the eyes of a person of 1.75 m who stands upright."""
+
+
+@dataclass(frozen=True, slots=True)
+class Skeleton:
+    """Lengths in m. ``torso`` is from the eyes down to the hips' centre, ``hip_back`` how far behind them that is."""
+
+    height: float
+    thigh: float
+    shank: float
+    torso: float
+    hip_width: float
+    hip_back: float
+
+    @classmethod
+    def of(cls, body: BodySettings) -> Skeleton:
+        """From the settings; what is nil is scaled from the height."""
+        tall = body.height
+        return cls(
+            height=tall,
+            thigh=body.thigh or _THIGH * tall,
+            shank=body.shank or _SHANK * tall,
+            torso=body.torso or (_EYE_HEIGHT - _HIP_HEIGHT) * tall,
+            hip_width=body.hip_width or _HIP_WIDTH * tall,
+            hip_back=_HIP_BACK * tall if body.hip_back is None else body.hip_back,
+        )
+
+    @classmethod
+    def calibrated(cls, values: BodyValues) -> Skeleton:
+        """From a calibration."""
+        return cls(values.height, values.thigh, values.shank, values.torso, values.hip_width, values.hip_back)

@@ -1,0 +1,194 @@
+"""The fusion core: messages in, messages out, and no clock of its own.
+
+The same messages at the same instants give the same results to the bit, so a recording can be replayed offline.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from foottrack_protocol import Message
+from foottrack_protocol.frames import MAX_HEAD_GAP_S, SIDES
+from foottrack_protocol.messages import (
+    BodyCalibration,
+    BodyPose,
+    FilterHealth,
+    FloorCalibration,
+    FootPose,
+    HeadingCalibration,
+    HeadPose,
+    ImuCalibration,
+    MountCalibration,
+    Pose,
+    Side,
+)
+from foottrack_service import rotations as rot
+from foottrack_service.body.pose import Legs, solve_legs
+from foottrack_service.body.skeleton import Skeleton
+from foottrack_service.config import Settings
+from foottrack_service.fusion.foot import Foot
+from foottrack_service.fusion.head_history import HeadHistory
+from foottrack_service.fusion.interface import FootEstimate, HeadSample
+from foottrack_service.rotations import Array
+
+SOURCE = "fusion"
+_MOST_DISTANCE = 1000.0
+"""m: a head further from the stage's origin is no pose."""
+
+
+class FusionCore:
+    """Fuses one user's measurements into ``pose/body``."""
+
+    def __init__(self, settings: Settings, sid: str = "offline") -> None:
+        self._user = settings.user
+        self._sid = sid
+        self._skeleton = Skeleton.of(settings.body)
+        self._heads = HeadHistory()
+        self._origin: int | None = None
+        self._feet: dict[Side, Foot] = {side: Foot(settings, side, self._heads) for side in SIDES}
+        self._toes = {side: np.array(settings.feet.of(side).toe.p) for side in SIDES}
+        self._shortest_ns = round(1e9 / settings.fusion.max_output_hz)
+        self._silence_ns = round(settings.fusion.silence * 1e9)
+        self._last_output: int | None = None
+        self._started = False
+        self._seq: dict[str, int] = {}
+
+    @property
+    def health(self) -> dict[str, FilterHealth]:
+        """Accepted and rejected measurements by ``user/side``."""
+        return {f"{self._user}/{side}": foot.health for side, foot in self._feet.items()}
+
+    @property
+    def deadline(self) -> int | None:
+        """When the timer has to publish because nothing came; None before anything is known. ns."""
+        return None if self._last_output is None else self._last_output + self._silence_ns
+
+    def handle(self, message: Message, now: int) -> list[Message]:
+        """Take a message that arrives at ``now`` (ns, never falling) and give what it brings on."""
+        if message.user != self._user:
+            return []
+        kind, _, tail = message.stream.partition("/")
+        side: Side | None = "left" if tail == "left" else "right" if tail == "right" else None
+        if kind == "imu" and side:
+            return self._on_imu(side, message, now)
+        if not message.valid:
+            if side and kind in ("marker", "depth"):
+                self._feet[side].reject("invalid")
+        elif kind == "marker" and side:
+            self._feet[side].on_optical("marker", message.t, message.data, now)
+            self._started = True
+        elif kind == "depth" and side:
+            self._feet[side].on_optical("depth", message.t, message.data, now)
+            self._started = True
+        elif message.stream == "head/pose":
+            self._on_head(message.t, message.data, now)
+        elif message.stream == "calibration":
+            self._on_calibration(message.data)
+        if self._last_output is None and self._started:
+            return self._publish(now)
+        return []
+
+    def tick(self, now: int) -> list[Message]:
+        """The timer: publishes when nothing has been published for 20 ms."""
+        deadline = self.deadline
+        return self._publish(now) if deadline is not None and now >= deadline else []
+
+    def _on_imu(self, side: Side, message: Message, now: int) -> list[Message]:
+        if not message.valid:
+            self._feet[side].reject("invalid")
+            return []
+        self._feet[side].on_imu(message.t, message.data)
+        self._started = True
+        if self._last_output is not None and now - self._last_output < self._shortest_ns:
+            return []
+        return self._publish(now)
+
+    def _on_head(self, t: int, body: HeadPose, now: int) -> None:
+        if self._origin is not None and body.origin != self._origin:
+            moved = body.moved
+            p, q = (None, None) if moved is None else (np.array(moved.p), np.array(moved.q))
+            if p is None or q is None:
+                self._heads.clear()
+            else:
+                self._heads.move(p, q)
+            for foot in self._feet.values():
+                foot.on_recentred(p, q)
+        self._origin = body.origin
+        if not body.tracked or body.p is None or body.q is None or max(map(abs, body.p)) > _MOST_DISTANCE:
+            self._heads.add_untracked(t)
+        else:
+            self._heads.add(HeadSample(t, np.array(body.p), np.array(body.q)))
+            self._started = True
+        for foot in self._feet.values():
+            foot.settle(now)
+
+    def _on_calibration(self, found: Any) -> None:
+        if isinstance(found, FloorCalibration):
+            for foot in self._feet.values():
+                foot.on_floor(found.values.height)
+        elif isinstance(found, BodyCalibration):
+            self._skeleton = Skeleton.calibrated(found.values)
+        elif isinstance(found, HeadingCalibration):
+            for side, foot in self._feet.items():
+                yaw = getattr(found.values.imu_yaw, side)
+                if yaw is not None:
+                    foot.on_imu_yaw(yaw)
+        elif isinstance(found, ImuCalibration):
+            self._feet[found.values.side].on_imu_calibration(found.values)
+        elif isinstance(found, MountCalibration):
+            for foot in self._feet.values():
+                foot.on_mount(found.values)
+
+    def _publish(self, now: int) -> list[Message]:
+        self._last_output = now
+        feet: dict[Side, FootEstimate] = {}
+        for side, foot in self._feet.items():
+            foot.settle(now)
+            found = foot.estimate(now)
+            if found is not None:
+                feet[side] = found
+        head = self._heads.newest
+        if head is not None and abs(now - head.t) * 1e-9 > MAX_HEAD_GAP_S:
+            head = None
+        legs = None
+        if head is not None:
+            legs = solve_legs(head.p, head.q, {side: found.p for side, found in feet.items()}, self._skeleton)
+        body = BodyPose(
+            head=None if head is None else _pose(head.p, head.q),
+            hips=None if legs is None else _pose(legs.hips_p, legs.hips_q),
+            left=self._foot_pose("left", feet.get("left"), legs),
+            right=self._foot_pose("right", feet.get("right"), legs),
+        )
+        return [self._message("pose/body", now, now, body)]
+
+    def _foot_pose(self, side: Side, found: FootEstimate | None, legs: Legs | None) -> FootPose | None:
+        if found is None:
+            return None
+        return FootPose(
+            hip=None if legs is None else _vec(legs.joints[side]),
+            knee=None if legs is None else _vec(legs.knees[side]),
+            ankle=_pose(found.p, found.q),
+            toe=_vec(found.p + rot.rotate(found.q, self._toes[side])),
+            v=_vec(found.v),
+            contact=found.contact,
+            stage=found.stage,
+            sigma=found.sigma,
+            age=found.age,
+        )
+
+    def _message(self, stream: str, t: int, now: int, body: Any) -> Message:
+        seq = self._seq.get(stream, 0)
+        self._seq[stream] = seq + 1
+        return Message(self._user, stream, SOURCE, self._sid, seq, t, now, True, body)
+
+
+def _vec(v: Array) -> tuple[float, float, float]:
+    x, y, z = v.tolist()
+    return x, y, z
+
+
+def _pose(p: Array, q: Array) -> Pose:
+    x, y, z, w = q.tolist()
+    return Pose(p=_vec(p), q=(x, y, z, w))

@@ -1,0 +1,13 @@
+"""Which filter runs: ``[fusion] filter``."""
+
+from __future__ import annotations
+
+from foottrack_protocol.messages import Side
+from foottrack_service.config import Settings
+from foottrack_service.fusion.interface import FootFilter
+from foottrack_service.fusion.reference import ReferenceFilter
+
+
+def make_filter(settings: Settings, side: Side) -> FootFilter:
+    """One foot's filter, as the settings choose it."""
+    return ReferenceFilter(settings.feet.of(side), side)

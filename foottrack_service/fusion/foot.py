@@ -1,0 +1,162 @@
+"""One foot in the fusion core: what came from its sensors, in the filter's terms, counted."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from foottrack_protocol.messages import FilterHealth, Imu, ImuValues, MountValues, Optical, Side
+from foottrack_service import rotations as rot
+from foottrack_service.config import Placement, Settings
+from foottrack_service.fusion.filters import make_filter
+from foottrack_service.fusion.head_history import HeadHistory
+from foottrack_service.fusion.interface import FootEstimate, HeadSample, ImuSample, Kind, OpticalFix, Verdict
+from foottrack_service.rotations import Array
+
+MOST_ACCELERATION = 1000.0
+"""m/s^2. Feet reach 170; beyond this it is no measurement."""
+MOST_RATE = 100.0
+"""rad/s."""
+MOST_DISTANCE = 20.0
+"""m. No camera on a head sees its own feet further away."""
+MOST_VARIANCE = 100.0
+"""m^2."""
+WAIT_FOR_HEAD_S = 0.1
+"""How long a fix waits for the head pose that brackets it."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Waiting:
+    kind: Kind
+    t: int
+    arrived: int
+    body: Optical
+
+
+class Foot:
+    """Takes a foot's messages, checks that they are plausible, and runs its filter."""
+
+    def __init__(self, settings: Settings, side: Side, heads: HeadHistory) -> None:
+        self._settings, self._side = settings, side
+        self._filter = make_filter(settings, side)
+        self._heads = heads
+        self._delay_ns = round(settings.timing.imu_delay * 1e9)
+        self._acc_bias: Array | None = None
+        self._gyro_bias: Array | None = None
+        self._mount: Placement | None = None
+        self._waiting: deque[_Waiting] = deque(maxlen=64)
+        self._accepted: Counter[str] = Counter()
+        self._rejected: Counter[str] = Counter()
+
+    @property
+    def health(self) -> FilterHealth:
+        """What became of the measurements since the start."""
+        return FilterHealth(accepted=dict(self._accepted), rejected=dict(self._rejected))
+
+    def reject(self, reason: str) -> None:
+        """Count a measurement that never reached the filter."""
+        self._rejected[reason] += 1
+
+    def on_imu(self, t: int, body: Imu) -> None:
+        """A sample of the foot's IMU, stamped ``t`` ns."""
+        if max(map(abs, body.acc)) > MOST_ACCELERATION or (body.gyro and max(map(abs, body.gyro)) > MOST_RATE):
+            self.reject("implausible")
+            return
+        acc = np.array(body.acc)
+        gyro = None if body.gyro is None else np.array(body.gyro)
+        if self._acc_bias is not None:
+            acc = acc - self._acc_bias
+        if self._gyro_bias is not None and gyro is not None:
+            gyro = gyro - self._gyro_bias
+        q = None if body.q is None else np.array(body.q)
+        self._filter.on_imu(ImuSample(t - self._delay_ns, acc, gyro, q))
+        self._accepted["imu"] += 1
+
+    def on_optical(self, kind: Kind, t: int, body: Optical, now: int) -> None:
+        """A camera's fix made at ``t``, arriving at ``now`` (ns). It may have to wait for the head pose around it."""
+        if math.dist(body.p, (0.0, 0.0, 0.0)) > MOST_DISTANCE or max(map(abs, body.cov)) > MOST_VARIANCE:
+            self.reject("implausible")
+        elif self._heads.newest is None:
+            self.reject(Verdict.NO_HEAD_POSE)
+        else:
+            if len(self._waiting) == self._waiting.maxlen:
+                self.reject(Verdict.NO_HEAD_POSE)
+            self._waiting.append(_Waiting(kind, t, now, body))
+            self.settle(now)
+
+    def settle(self, now: int) -> None:
+        """Hand the waiting fixes whose head pose is known by now to the filter, in order."""
+        while self._waiting:
+            first = self._waiting[0]
+            newest = self._heads.newest
+            at_picture = self._heads.at(first.t)
+            if at_picture is None and newest is not None and not self._filter.waits_for_head:
+                at_picture = newest
+            if at_picture is None or newest is None:
+                if (now - first.arrived) * 1e-9 < WAIT_FOR_HEAD_S:
+                    return
+                self.reject(Verdict.NO_HEAD_POSE)
+            else:
+                self._fuse(first, at_picture, newest, now)
+            self._waiting.popleft()
+
+    def on_floor(self, height: float) -> None:
+        """The floor was calibrated, m."""
+        self._filter.on_floor(height)
+
+    def on_imu_yaw(self, yaw: float) -> None:
+        """The device's yaw in the stage was calibrated, rad."""
+        self._filter.on_imu_yaw(yaw)
+
+    def on_imu_calibration(self, values: ImuValues) -> None:
+        """Biases and the sensor's place on the shoe."""
+        self._acc_bias, self._gyro_bias = np.array(values.acc_bias), np.array(values.gyro_bias)
+        self._filter.on_imu_placement(Placement(p=values.p, q=values.q))
+
+    def on_mount(self, values: MountValues) -> None:
+        """A correction of the camera's mount, if it was found for the mount that is configured."""
+        if values.base == self._settings.camera.mount_hash:
+            self._mount = Placement(p=values.p, q=values.q)
+
+    def on_recentred(self, p: Array | None, q: Array | None) -> None:
+        """The stage moved, old to new; None when nobody knows how. Fixes that wait belong to the old one."""
+        for _ in range(len(self._waiting) if p is None else 0):
+            self._waiting.popleft()
+            self.reject(Verdict.NO_HEAD_POSE)
+        self._filter.on_recentred(p, q)
+
+    def estimate(self, t: int) -> FootEstimate | None:
+        """The foot at ``t`` ns, None when unknown or no longer a number."""
+        found = self._filter.estimate(t)
+        if found is None:
+            return None
+        if not (np.isfinite(found.p).all() and np.isfinite(found.q).all() and np.isfinite(found.v).all()):
+            # A filter that lost its numbers starts again from the next measurement and never speaks them.
+            self.reject("not_finite")
+            self._filter = make_filter(self._settings, self._side)
+            return None
+        return found
+
+    def _fuse(self, waiting: _Waiting, head: HeadSample, newest: HeadSample, now: int) -> None:
+        body = waiting.body
+        p = np.array(body.p)
+        q = None if body.q is None else np.array(body.q)
+        q_alt = None if body.q_alt is None else np.array(body.q_alt)
+        xx, xy, xz, yy, yz, zz = body.cov
+        cov = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if self._mount is not None:
+            turn = np.array(self._mount.q)
+            p = rot.rotate(turn, p) + np.array(self._mount.p)
+            q = None if q is None else rot.multiply(turn, q)
+            q_alt = None if q_alt is None else rot.multiply(turn, q_alt)
+            matrix = rot.to_matrix(turn)
+            cov = matrix @ cov @ matrix.T
+        fix = OpticalFix(waiting.t, waiting.kind, p, q, q_alt, cov, body.size_ratio, body.edge_px, head, newest)
+        verdict = self._filter.on_fix(fix, now)
+        if verdict is Verdict.ACCEPTED:
+            self._accepted[waiting.kind] += 1
+        else:
+            self._rejected[verdict] += 1
