@@ -6,15 +6,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import msgpack
 from pydantic import ValidationError
 
 from foottrack_protocol.errors import DecodeError, EncodeError, Reason, TopicError
-from foottrack_protocol.messages import Body
 from foottrack_protocol.topics import Topic, lookup, split_topic
+from foottrack_protocol.values import INT64_MAX, INT64_MIN, MAX_ITEMS, Body
 
 PROTOCOL_MAJOR = 1
 PROTOCOL_MINOR = 0
@@ -23,8 +24,9 @@ MAX_TOPIC_BYTES = 128
 MAX_DEPTH = 12
 """Containers inside containers, the envelope being the first."""
 
-_INT64 = range(-(2**63), 2**63)
-_NOT_FINITE_TYPES = frozenset({"finite_number"})
+_KEYS = 8
+"""Of the envelope, as far as this version knows them."""
+_TOO_DEEP = f"more than {MAX_DEPTH} levels"
 
 
 class Message(NamedTuple):
@@ -47,85 +49,89 @@ class Message(NamedTuple):
 
 
 def encode(message: Message) -> tuple[bytes, bytes]:
-    """The two frames of a message.
+    """The two frames of a message. What a receiver would refuse is refused here.
 
-    Raises EncodeError when the receiver would refuse it for its size or a stamp out of range, TopicError for an unknown
-    stream. The body is a model and was validated when it was made.
+    Raises TopicError for an unknown stream, EncodeError for anything else that is wrong: an envelope's value of the
+    wrong type (numpy's integers and booleans are wrong ones), a body of another stream, a payload that is too large.
+    The body's own values were validated when it was made.
     """
-    topic = f"{message.user}/{message.stream}"
-    lookup(message.user, message.stream)
+    user, stream, src, sid, seq, t, t_pub, valid, data = message
+    try:
+        entry, topic = _entry_and_frame(user, stream)
+    except TypeError:
+        raise TopicError("user and stream must be strings") from None
+    fault = _fault(src, sid, seq, t, t_pub, valid)
+    if fault is not None:
+        raise EncodeError(f"{message.topic}: {fault}")
+    if not isinstance(data, entry.models):
+        due = " or ".join(model.__name__ for model in entry.models)
+        raise EncodeError(f"{message.topic}: data must be {due}, not {type(data).__name__}")
     try:
         payload: bytes = msgpack.packb(
             {
                 "v": PROTOCOL_MAJOR,
-                "src": message.src,
-                "sid": message.sid,
-                "seq": message.seq,
-                "t": message.t,
-                "t_pub": message.t_pub,
-                "valid": message.valid,
-                "data": message.data,
+                "src": src,
+                "sid": sid,
+                "seq": seq,
+                "t": t,
+                "t_pub": t_pub,
+                "valid": valid,
+                "data": data.__dict__,
             },
             default=_fields,
         )
     except (TypeError, ValueError, OverflowError) as error:
-        raise EncodeError(f"{topic}: {error}") from error
+        raise EncodeError(f"{message.topic}: {error}") from error
     if len(payload) > MAX_PAYLOAD_BYTES:
-        raise EncodeError(f"{topic}: {len(payload)} bytes, at most {MAX_PAYLOAD_BYTES}")
-    return topic.encode(), payload
+        raise EncodeError(f"{message.topic}: {_too_large(payload)}")
+    return topic, payload
 
 
 def decode(frames: Sequence[bytes]) -> Message:
     """The message in two frames. Raises DecodeError, and nothing else, for bytes that are none."""
     if len(frames) != 2:
         raise DecodeError(Reason.FRAMES, f"{len(frames)} frames, must be 2")
-    raw_topic, payload = frames
-    user, entry = _read_topic(raw_topic)
-    topic = f"{user}/{entry.stream}"
-    if len(payload) > MAX_PAYLOAD_BYTES:
-        raise DecodeError(Reason.OVERSIZED, f"{len(payload)} bytes, at most {MAX_PAYLOAD_BYTES}", topic)
-    return read_envelope(_unpack(payload, topic), user, entry)
+    user, entry, topic = _read_topic(frames[0])
+    return read_envelope(_unpack(frames[1], topic), user, entry)
 
 
 def read_envelope(envelope: dict[Any, Any], user: str, entry: Topic) -> Message:
     """The message of an unpacked envelope, as ``decode`` and importers of bare streams need it. Raises DecodeError."""
-    topic = f"{user}/{entry.stream}"
-    get = envelope.get
+    get: Callable[[str], Any] = envelope.get
     version = get("v")
-    if type(version) is not int:
-        raise DecodeError(Reason.ENVELOPE, "v must be an int", topic)
-    if version != PROTOCOL_MAJOR:
-        raise DecodeError(Reason.VERSION, f"protocol {version}, this side speaks {PROTOCOL_MAJOR}", topic)
+    if version != PROTOCOL_MAJOR or type(version) is not int:
+        raise _version_error(version, f"{user}/{entry.stream}")
     src, sid, seq, t, t_pub, valid = get("src"), get("sid"), get("seq"), get("t"), get("t_pub"), get("valid")
-    if type(src) is not str or type(sid) is not str:
-        raise DecodeError(Reason.ENVELOPE, "src and sid must be strings", topic)
-    if type(seq) is not int or seq < 0 or seq not in _INT64:
-        raise DecodeError(Reason.ENVELOPE, "seq must be an int from 0", topic)
-    if type(t) is not int or type(t_pub) is not int or t not in _INT64 or t_pub not in _INT64:
-        raise DecodeError(Reason.ENVELOPE, "t and t_pub must be ints of 64 bits (ns)", topic)
-    if type(valid) is not bool:
-        raise DecodeError(Reason.ENVELOPE, "valid must be a bool", topic)
+    fault = _fault(src, sid, seq, t, t_pub, valid)
+    if fault is not None:
+        raise DecodeError(Reason.ENVELOPE, fault, f"{user}/{entry.stream}")
     if "data" not in envelope:
-        raise DecodeError(Reason.ENVELOPE, "data is missing", topic)
-    try:
-        data = entry.adapter.validate_python(envelope["data"])
-    except ValidationError as error:
-        raise _body_error(error, topic) from None
+        raise DecodeError(Reason.ENVELOPE, "data is missing", f"{user}/{entry.stream}")
+    if len(envelope) == _KEYS:
+        try:
+            # Nothing that the models know is deep, so the depth is only measured where they meet unknown keys.
+            data = entry.adapter.validator.validate_python(envelope["data"], extra="forbid")
+        except ValidationError:
+            data = _read_body_among_unknown_keys(envelope, user, entry)
+    else:
+        data = _read_body_among_unknown_keys(envelope, user, entry)
     return Message(user, entry.stream, src, sid, seq, t, t_pub, valid, data)
 
 
 def unpack_map(payload: bytes) -> dict[Any, Any]:
-    """A msgpack map within the limits of size and depth, as the control socket needs it. Raises DecodeError."""
-    if len(payload) > MAX_PAYLOAD_BYTES:
-        raise DecodeError(Reason.OVERSIZED, f"{len(payload)} bytes, at most {MAX_PAYLOAD_BYTES}")
-    return _unpack(payload, None)
+    """A msgpack map within the limits of the wire, as the control socket needs it. Raises DecodeError."""
+    values = _unpack(payload, None)
+    if _deeper_than(values, MAX_DEPTH):
+        raise DecodeError(Reason.DEPTH, _TOO_DEEP)
+    return values
 
 
 def pack_map(values: dict[str, Any]) -> bytes:
-    """A msgpack map; models inside are written as maps. Raises EncodeError."""
+    """A msgpack map that ``unpack_map`` takes; models inside are written as maps. Raises EncodeError."""
     try:
         packed: bytes = msgpack.packb(values, default=_fields)
-    except (TypeError, ValueError, OverflowError) as error:
+        unpack_map(packed)
+    except (TypeError, ValueError, OverflowError, DecodeError) as error:
         raise EncodeError(str(error)) from error
     return packed
 
@@ -136,48 +142,88 @@ def _fields(value: object) -> dict[str, Any]:
     raise TypeError(f"{type(value).__name__} has no place on the wire")
 
 
-def _read_topic(raw: bytes) -> tuple[str, Topic]:
+@lru_cache(maxsize=1024)
+def _entry_and_frame(user: str, stream: str) -> tuple[Topic, bytes]:
+    return lookup(user, stream), f"{user}/{stream}".encode()
+
+
+@lru_cache(maxsize=1024)
+def _read_topic(raw: bytes) -> tuple[str, Topic, str]:
     if len(raw) > MAX_TOPIC_BYTES:
         raise DecodeError(Reason.TOPIC, f"topic of {len(raw)} bytes")
     try:
-        return split_topic(raw.decode())
+        topic = raw.decode()
+        return *split_topic(topic), topic
     except (UnicodeDecodeError, TopicError) as error:
         raise DecodeError(Reason.TOPIC, str(error)) from None
 
 
+def _fault(src: object, sid: object, seq: object, t: object, t_pub: object, valid: object) -> str | None:
+    """What is wrong with an envelope's values."""
+    if not (isinstance(src, str) and isinstance(sid, str)):
+        return "src and sid must be strings"
+    if type(seq) is not int or not 0 <= seq <= INT64_MAX:
+        return "seq must be an int from 0"
+    if type(t) is not int or type(t_pub) is not int:
+        return "t and t_pub must be ints (ns)"
+    if not (INT64_MIN <= t <= INT64_MAX and INT64_MIN <= t_pub <= INT64_MAX):
+        return "t and t_pub must fit into 64 bits"
+    if type(valid) is not bool:
+        return "valid must be a bool"
+    return None
+
+
 def _unpack(payload: bytes, topic: str | None) -> dict[Any, Any]:
+    if len(payload) > MAX_PAYLOAD_BYTES:
+        raise DecodeError(Reason.OVERSIZED, _too_large(payload), topic)
     try:
-        value = msgpack.unpackb(payload)
+        value = msgpack.unpackb(payload, max_array_len=MAX_ITEMS, max_map_len=MAX_ITEMS)
     except (msgpack.StackError, RecursionError):
-        raise DecodeError(Reason.DEPTH, f"more than {MAX_DEPTH} levels", topic) from None
+        raise DecodeError(Reason.DEPTH, _TOO_DEEP, topic) from None
     except Exception as error:  # msgpack raises a dozen kinds; whatever it was, these bytes are no message
-        raise DecodeError(Reason.MSGPACK, f"{type(error).__name__}: {error}"[:200], topic) from None
+        raise DecodeError(Reason.MSGPACK, f"{type(error).__name__}: {error}", topic) from None
     if type(value) is not dict:
         raise DecodeError(Reason.ENVELOPE, f"a map is due, not {type(value).__name__}", topic)
-    if _deeper_than(value, MAX_DEPTH):
-        raise DecodeError(Reason.DEPTH, f"more than {MAX_DEPTH} levels", topic)
     return value
+
+
+def _read_body_among_unknown_keys(envelope: dict[Any, Any], user: str, entry: Topic) -> Any:
+    topic = f"{user}/{entry.stream}"
+    if _deeper_than(envelope, MAX_DEPTH):
+        raise DecodeError(Reason.DEPTH, _TOO_DEEP, topic)
+    try:
+        return entry.adapter.validator.validate_python(envelope["data"])
+    except ValidationError as error:
+        raise _body_error(error, topic) from None
 
 
 def _deeper_than(value: dict[Any, Any], limit: int) -> bool:
     level: list[Any] = [value]
     for _ in range(limit):
-        below = [
+        level = [
             item
             for container in level
             for item in (container.values() if type(container) is dict else container)
             if type(item) is dict or type(item) is list
         ]
-        if not below:
+        if not level:
             return False
-        level = below
     return True
+
+
+def _too_large(payload: bytes) -> str:
+    return f"{len(payload)} bytes, at most {MAX_PAYLOAD_BYTES}"
+
+
+def _version_error(version: object, topic: str) -> DecodeError:
+    if type(version) is not int:
+        return DecodeError(Reason.ENVELOPE, "v must be an int", topic)
+    return DecodeError(Reason.VERSION, f"protocol {version}, this side speaks {PROTOCOL_MAJOR}", topic)
 
 
 def _body_error(error: ValidationError, topic: str) -> DecodeError:
     first = error.errors(include_url=False, include_context=False)[0]
     place = ".".join(str(part) for part in first["loc"]) or "data"
-    given = first.get("input")
-    not_finite = first["type"] in _NOT_FINITE_TYPES or (type(given) is float and not math.isfinite(given))
-    reason = Reason.NOT_FINITE if not_finite else Reason.BODY
-    return DecodeError(reason, f"{place}: {first['msg']}", topic)
+    given = first["input"]
+    not_finite = type(given) is float and not math.isfinite(given)
+    return DecodeError(Reason.NOT_FINITE if not_finite else Reason.BODY, f"{place}: {first['msg']}", topic)

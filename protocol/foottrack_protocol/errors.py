@@ -12,6 +12,9 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+MAX_DETAIL = 200
+"""Characters of a DecodeError's detail."""
+
 
 class Reason(StrEnum):
     """Why bytes were not a message. The values appear in ``sys/health`` as the keys of ``drops``."""
@@ -46,6 +49,8 @@ class DecodeError(ProtocolError):
     """
 
     def __init__(self, reason: Reason, detail: str, topic: str | None = None) -> None:
+        # What came in may be quoted in it, and is of any length.
+        detail = detail if len(detail) <= MAX_DETAIL else f"{detail[:MAX_DETAIL]}..."
         super().__init__(f"{reason}: {detail}" + (f" (topic {topic})" if topic else ""))
         self.reason = reason
         self.detail = detail

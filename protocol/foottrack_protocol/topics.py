@@ -5,20 +5,21 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import TypeAdapter
 
 from foottrack_protocol import messages as m
 from foottrack_protocol.errors import TopicError
 from foottrack_protocol.frames import SIDES
+from foottrack_protocol.system import USER_PATTERN
 
 DEFAULT_USER = "user"
 SYSTEM = "sys"
 WELCOME = b"sys/welcome"
 """What the egress socket says to a new subscriber: the only message of one frame."""
 
-_USER = re.compile(r"[a-z0-9][a-z0-9-]{0,31}\Z")
+_USER = re.compile(USER_PATTERN)
 
 
 class Policy(StrEnum):
@@ -54,9 +55,13 @@ class Topic:
     schema: str
     """Name of the schema file, which streams with the same body share."""
     adapter: TypeAdapter[Any] = field(init=False, repr=False, compare=False)
+    models: tuple[type, ...] = field(init=False, repr=False, compare=False)
+    """The classes that a body of this stream may have."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "adapter", TypeAdapter(self.body))
+        union = get_args(self.body)[0] if get_origin(self.body) is Annotated else self.body
+        object.__setattr__(self, "models", get_args(union) or (union,))
 
     @property
     def is_system(self) -> bool:
@@ -97,14 +102,14 @@ SYSTEM_TOPICS: dict[str, Topic] = {topic.stream: topic for topic in _ALL if topi
 
 def is_user(name: str) -> bool:
     """Whether a name may stand for a user in a topic."""
-    return name != SYSTEM and _USER.match(name) is not None
+    return name != SYSTEM and _USER.fullmatch(name) is not None
 
 
 def lookup(user: str, stream: str) -> Topic:
     """The registry's entry. Raises TopicError when the user is malformed or the stream unknown."""
     if user == SYSTEM:
         found = SYSTEM_TOPICS.get(stream)
-    elif _USER.match(user):
+    elif _USER.fullmatch(user):
         found = TOPICS.get(stream)
     else:
         raise TopicError(f"{user!r} is no user name (a-z, 0-9 and '-', at most 32, '{SYSTEM}' is reserved)")
