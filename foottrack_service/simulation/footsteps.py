@@ -1,0 +1,190 @@
+"""One foot's motion from a plan of steps.
+
+In stance a foot turns about a point that does not move: the heel after the strike, none while it is flat, the ball
+after the heel has left. In between the ankle flies on quintics whose ends have the position, velocity and acceleration
+of the turning foot, so the specific force is continuous throughout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BPoly
+
+from foottrack_service import rotations
+from foottrack_service.rotations import Array
+from foottrack_service.simulation.anatomy import Sole
+from foottrack_service.simulation.truth import Flags
+
+
+class Place(NamedTuple):
+    """Where a foot stands flat: the ankle's x, z [m, stage] and the toes' heading [rad, positive to the left]."""
+
+    x: float
+    z: float
+    yaw: float
+
+    def ahead(self, forward: float, right: float = 0.0, turn: float = 0.0) -> Place:
+        """A place relative to this one and its heading, m and rad."""
+        sine, cosine = np.sin(self.yaw), np.cos(self.yaw)
+        return Place(
+            self.x - forward * sine + right * cosine, self.z - forward * cosine - right * sine, self.yaw + turn
+        )
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a foot is moved. Pitches are positive with the heel above the toes."""
+
+    swing: float
+    """Toe-off to strike, s."""
+    roll: float
+    """Heel-off to toe-off, s."""
+    settle: float
+    """Strike to flat, s."""
+    toe_off_pitch: float
+    """rad."""
+    toe_off_rate: float
+    """rad/s."""
+    strike_pitch: float
+    """rad, negative: the heel lands first."""
+    lift: float
+    """m above the shortest smooth way of the ankle, at mid swing."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of one foot: toe-off at `start`, s."""
+
+    start: float
+    place: Place
+    style: Style
+
+    @property
+    def heel_off(self) -> float:
+        """s."""
+        return self.start - self.style.roll
+
+    @property
+    def strike(self) -> float:
+        """s."""
+        return self.start + self.style.swing
+
+    @property
+    def flat(self) -> float:
+        """s."""
+        return self.strike + self.style.settle
+
+
+@dataclass
+class FootSamples:
+    """A foot on the truth's grid, before it becomes a track."""
+
+    t: Array
+    p: Array
+    """(n, 3) ankle, m."""
+    yaw: Array
+    """(n,) rad, unwrapped."""
+    pitch: Array
+    """(n,) rad, heel up."""
+    heel: Flags
+    toe: Flags
+    strikes: Array
+    flats: Array
+
+    @property
+    def q(self) -> Array:
+        """(n, 4) foot to stage."""
+        return rotations.multiply(rotations.from_yaw(self.yaw), rotations.from_axis_angle([1.0, 0.0, 0.0], -self.pitch))
+
+
+def standing(t: Array, place: Place, sole: Sole) -> FootSamples:
+    """A foot that stands flat throughout."""
+    n = len(t)
+    still = np.ones(n, dtype=np.bool_)
+    p = np.tile([place.x, sole.ankle_height, place.z], (n, 1))
+    none = np.empty(0)
+    return FootSamples(t, p, np.full(n, place.yaw), np.zeros(n), still, still.copy(), none, none)
+
+
+def stepping(t: Array, place: Place, steps: Sequence[Step], sole: Sole) -> FootSamples:
+    """A foot that stands at `place` and takes `steps` on times `t` (n,), s.
+
+    Raises ValueError when a step's heel rises before the last one is flat.
+    """
+    foot = standing(t, place, sole)
+    last = -np.inf
+    for step in steps:
+        if step.heel_off < last:
+            raise ValueError(f"the heel rises at {step.heel_off:.3f} s, before the foot is flat at {last:.3f} s")
+        _take(foot, place, step, sole)
+        place, last = step.place, step.flat
+    foot.strikes = np.array([step.strike for step in steps])
+    foot.flats = np.array([step.flat for step in steps])
+    return foot
+
+
+def _take(foot: FootSamples, old: Place, step: Step, sole: Sole) -> None:
+    style, new, t = step.style, step.place, foot.t
+    off, on = (style.toe_off_pitch, style.toe_off_rate, 0.0), (style.strike_pitch, 0.0, 0.0)
+    instants = [step.heel_off, step.start, step.strike, step.flat]
+    pitch = BPoly.from_derivatives(instants, [(0.0, 0.0, 0.0), off, on, (0.0, 0.0, 0.0)])
+    rolls = (t >= step.heel_off) & (t < step.start)
+    flies = (t >= step.start) & (t < step.strike)
+    lands = (t >= step.strike) & (t < step.flat)
+    moves = rolls | flies | lands
+    foot.pitch[moves] = pitch(t[moves])
+
+    ball = np.array(_ankle(sole.ball_z, sole.ankle_height, foot.pitch[rolls])).T
+    heel = np.array(_ankle(-sole.heel_z, sole.ankle_height, foot.pitch[lands])).T
+    foot.p[rolls] = _in_stage(old, ball + [sole.ball_z, 0.0])
+    foot.p[lands] = _in_stage(new, heel + [-sole.heel_z, 0.0])
+
+    take_off = _turning(sole.ball_z, sole.ankle_height, off)
+    touch_down = _turning(-sole.heel_z, sole.ankle_height, on)
+    take_off[0] += [sole.ball_z, 0.0]
+    touch_down[0] += [-sole.heel_z, 0.0]
+    ends = np.array(
+        [
+            [_in_stage(old, take_off[0]), *(_direction(old, d) for d in take_off[1:])],
+            [_in_stage(new, touch_down[0]), *(_direction(new, d) for d in touch_down[1:])],
+        ]
+    )
+    way = BPoly.from_derivatives([step.start, step.strike], ends)
+    share = (t[flies] - step.start) / style.swing
+    foot.p[flies] = way(t[flies])
+    foot.p[flies, 1] += style.lift * (4.0 * share * (1.0 - share)) ** 3
+    foot.yaw[flies] = old.yaw + (new.yaw - old.yaw) * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    after = t >= step.strike
+    foot.yaw[after] = new.yaw
+    foot.p[t >= step.flat] = [new.x, sole.ankle_height, new.z]
+
+    foot.heel[(t >= step.heel_off) & (t < step.strike)] = False
+    foot.toe[(t >= step.start) & (t < step.flat)] = False
+
+
+def _ankle(ahead: float, height: float, pitch: Array | float) -> tuple[Array, Array]:
+    """Ankle from a pivot that lies `ahead` of it on the sole: forward and up, m."""
+    sine, cosine = np.sin(pitch), np.cos(pitch)
+    return height * sine - ahead * cosine, height * cosine + ahead * sine
+
+
+def _turning(ahead: float, height: float, pitch: tuple[float, float, float]) -> Array:
+    """(3, 2): the ankle's forward and up from its pivot, and their first and second derivatives."""
+    angle, rate, acceleration = pitch
+    forward, up = _ankle(ahead, height, angle)
+    tangent = np.array([up, -forward])
+    inward = np.array([-forward, -up])
+    return np.array([[forward, up], tangent * rate, tangent * acceleration + inward * rate**2])
+
+
+def _in_stage(place: Place, forward_up: Array) -> Array:
+    return _direction(place, forward_up) + np.array([place.x, 0.0, place.z])
+
+
+def _direction(place: Place, forward_up: Array) -> Array:
+    forward, up = forward_up[..., 0], forward_up[..., 1]
+    return np.stack([-forward * np.sin(place.yaw), up, -forward * np.cos(place.yaw)], axis=-1)

@@ -1,0 +1,174 @@
+"""Tasks of a person who wears the sensors. Every function: (seconds, settings, feet, random) to Truth."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+
+from foottrack_protocol.messages import Side
+from foottrack_service.config import Settings
+from foottrack_service.rotations import Array
+from foottrack_service.simulation import footwear
+from foottrack_service.simulation.anatomy import person, sole
+from foottrack_service.simulation.footsteps import stepping
+from foottrack_service.simulation.posture import Bearing, Extra, carried
+from foottrack_service.simulation.stride import (
+    CAUTIOUS,
+    IN_PLACE,
+    STANCE_WIDTH,
+    WALKING,
+    WALKING_WIDTH,
+    Planner,
+)
+from foottrack_service.simulation.truth import FootTrack, Truth, grid
+
+Feet = Literal["mild", "hard"]
+
+
+def still(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """Standing at ease."""
+    return _scene(seconds, settings, feet, random, Planner(random), Bearing(gaze_sd=math.radians(0.6), sway_sd=0.004))
+
+
+def head_moving(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """Feet still, the head turns, nods, tilts and shifts."""
+    bearing = Bearing(gaze_sd=math.radians(8.0), gaze_band_hz=0.6, sway_sd=0.03, sway_band_hz=0.5)
+    return _scene(seconds, settings, feet, random, Planner(random), bearing)
+
+
+def steps(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """One step forward and back."""
+    return _pairs(seconds, settings, feet, random, [(0.5, 0.0), (-0.45, 0.0)])
+
+
+def side_steps(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """One step to the right and back, one to the left and back."""
+    return _pairs(seconds, settings, feet, random, [(0.0, 0.35), (0.0, -0.35), (0.0, -0.35), (0.0, 0.35)])
+
+
+def line(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """2 m ahead, a turn, and back."""
+    plan = Planner(random)
+    while plan.now < seconds - 6.0:
+        plan.walk(2.0, 0.5, CAUTIOUS, 0.8, STANCE_WIDTH)
+        plan.stand(0.6)
+        plan.turn(math.pi, CAUTIOUS, 0.8)
+        plan.stand(0.8)
+    return _scene(seconds, settings, feet, random, plan, Bearing())
+
+
+def circle(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """Round a circle of 2 m diameter to the left, then to the right."""
+    plan = Planner(random)
+    direction = 1.0
+    while plan.now < seconds - 3.0:
+        angle = min(2.0 * math.pi, 0.45 * (seconds - plan.now - 2.0) / 0.8)
+        plan.arc(1.0, direction * angle, 0.45, CAUTIOUS, 0.8)
+        plan.stand(1.0)
+        direction = -direction
+    return _scene(seconds, settings, feet, random, plan, Bearing())
+
+
+def knee_bends(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """Down by 20 to 35 cm and up again every 3 s."""
+    t = grid(seconds)
+    crouch = np.zeros_like(t)
+    start = 1.5
+    while start + 3.0 < seconds:
+        crouch += random.uniform(0.2, 0.35) * _there_and_back(t, start, start + 3.0)
+        start += 3.0 + random.uniform(0.1, 0.6)
+    return _scene(seconds, settings, feet, random, Planner(random), Bearing(), Extra(crouch=crouch, lean=0.6 * crouch))
+
+
+def upper_body(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """Turns by 35 to 60 deg to either side, bending forward a little."""
+    t = grid(seconds)
+    yaw, lean = np.zeros_like(t), np.zeros_like(t)
+    start, direction = 1.5, 1.0
+    while start + 3.0 < seconds:
+        bump = _there_and_back(t, start, start + 3.0)
+        yaw += direction * math.radians(random.uniform(35.0, 60.0)) * bump
+        lean += random.uniform(0.03, 0.1) * bump
+        start, direction = start + 3.0 + random.uniform(0.1, 0.5), -direction
+    return _scene(seconds, settings, feet, random, Planner(random), Bearing(), Extra(lean=lean, yaw=yaw))
+
+
+def walk_in_place(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """Bouts of 8 to 16 steps at 1.5 to 1.9 steps/s, with pauses of 1.5 to 2.5 s."""
+    plan = Planner(random)
+    side: Side = "left"
+    while plan.now < seconds - 3.0:
+        interval = 1.0 / random.uniform(1.5, 1.9)
+        for _ in range(int(random.integers(8, 17))):
+            if plan.now > seconds - 1.5:
+                break
+            home = plan.start[side]
+            plan.step(side, home, IN_PLACE, interval)
+            side = "right" if side == "left" else "left"
+        plan.stand(random.uniform(1.5, 2.5))
+    return _scene(seconds, settings, feet, random, plan, Bearing())
+
+
+def walk(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """8 m at a stride of 1.40 m in 1.10 s (means of Schwartz 2008), a stop, a turn, and back."""
+    plan = Planner(random)
+    while plan.now < seconds - 5.0:
+        distance = min(8.0, 0.7 * max(2.0, round((seconds - plan.now - 2.0) / 0.55)))
+        plan.walk(distance, 0.70, WALKING, 0.55, WALKING_WIDTH)
+        plan.stand(0.8)
+        if plan.now < seconds - 6.0:
+            plan.turn(math.pi, CAUTIOUS, 0.8)
+            plan.stand(0.8)
+    return _scene(seconds, settings, feet, random, plan, Bearing())
+
+
+def _pairs(
+    seconds: float, settings: Settings, feet: Feet, random: np.random.Generator, moves: list[tuple[float, float]]
+) -> Truth:
+    """Steps after which the other foot follows; `moves` are (forward, right) m, over and over."""
+    plan = Planner(random)
+    index = 0
+    while plan.now < seconds - 4.0:
+        forward, right = moves[index % len(moves)]
+        first: Side = "left" if right < 0.0 or (right == 0.0 and index % 4 < 2) else "right"
+        second: Side = "right" if first == "left" else "left"
+        target = {side: place.ahead(forward, right) for side, place in plan.feet.items()}
+        plan.step(first, target[first], CAUTIOUS, 0.8)
+        plan.step(second, target[second], CAUTIOUS, 0.8)
+        plan.stand(random.uniform(0.5, 1.0))
+        index += 1
+    return _scene(seconds, settings, feet, random, plan, Bearing())
+
+
+def _scene(
+    seconds: float,
+    settings: Settings,
+    feet: Feet,
+    random: np.random.Generator,
+    plan: Planner,
+    bearing: Bearing,
+    extra: Extra = Extra(),  # noqa: B008 - frozen
+) -> Truth:
+    t = grid(seconds)
+    samples = {
+        side: stepping(t, plan.start[side], plan.steps[side], sole(settings.feet.of(side))) for side in plan.start
+    }
+    wearer = person(settings.body, settings.feet.left.ankle_height)
+    head, hips = carried(samples["left"], samples["right"], wearer, bearing, extra, random)
+    tracks: dict[Side, FootTrack] = {
+        side: footwear.track(foot, sole(settings.feet.of(side)), feet, random) for side, foot in samples.items()
+    }
+    return Truth(seconds, head, tracks, hips)
+
+
+def _there_and_back(t: Array, start: float, end: float) -> Array:
+    """0 to 1 and back to 0 between two instants, with a rest at the top, C2."""
+    rise = 0.4 * (end - start)
+    return _ease((t - start) / rise) - _ease((t - end + rise) / rise)
+
+
+def _ease(share: Array) -> Array:
+    s = np.clip(share, 0.0, 1.0)
+    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
