@@ -18,7 +18,8 @@ Handler = Callable[..., Any]
 class ControlServer:
     """Answers requests; ``hello``, ``time`` and ``status`` by itself. Whatever comes in gets an answer.
 
-    Codes: "bad_request" (not a request), "unknown_command", "bad_arguments", "busy", "internal", and what handlers raise.
+    Codes: "bad_request" (not a request), "unknown_command", "bad_arguments", "busy", "internal", and what handlers
+    raise.
     """
 
     def __init__(

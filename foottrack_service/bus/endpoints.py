@@ -19,6 +19,8 @@ MAX_FRAME_BYTES = 4 * 1024 * 1024
 """A peer that sends a larger frame is disconnected before the frame is held in memory. Well above what a receiver
 refuses, so that a message that is merely oversized is still counted."""
 
+_RELEASE_TIMEOUT_MS = 2_000
+
 
 def check_loopback(endpoint: str) -> None:
     """Raises BindRefused unless the endpoint is reachable from this host alone."""
@@ -48,6 +50,17 @@ def bind(socket: Socket, endpoint: str) -> str:
         raise BindFailed(f"cannot bind {endpoint}: {error}{hint}") from None
     actual: Any = socket.getsockopt(zmq.LAST_ENDPOINT)
     return str(actual.rstrip(b"\x00").decode())
+
+
+def release(socket: Socket, endpoint: str) -> None:
+    """Unbind, and wait until the port is free: libzmq closes it in a thread of its own."""
+    if not endpoint.startswith("tcp://"):
+        return
+    monitor = socket.get_monitor_socket(zmq.EVENT_CLOSED)
+    socket.unbind(endpoint)
+    monitor.poll(_RELEASE_TIMEOUT_MS)
+    socket.disable_monitor()
+    monitor.close(0)
 
 
 def _is_loopback(host: str) -> bool:

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
+import time
+import uuid
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from foottrack_protocol.envelope import Message
+import zmq
+
+from foottrack_protocol.envelope import Message, encode
+from foottrack_service.bus.broker import SUBSCRIBE_ALL, UNSUBSCRIBE_ALL
 from foottrack_service.bus.clock import BusClock, now
-from foottrack_service.bus.endpoints import Context
+from foottrack_service.bus.endpoints import HWM, Context, Socket
+from foottrack_service.bus.errors import NotReady
+from foottrack_service.bus.watch import ReadWatch
+
+NO_BUS = "no_bus"
+FULL = "full"
 
 
 class Publisher:
@@ -29,21 +40,40 @@ class Publisher:
     ) -> None:
         """``healthy`` false marks all messages ``valid: false``: a party on another host without a fresh offset."""
         self.src = src
-        self.sid = ""
+        self.sid = uuid.uuid4().hex[:12]
         self.sent = 0
         self.drops: Counter[str] = Counter()
         self.connections = 0
+        self._endpoint = endpoint
+        self._clock = clock
+        self._healthy = healthy
+        self._seq: dict[tuple[str, str], int] = {}
+        self._live = False
+        self._socket = _socket(context, endpoint)
+        self._watch = ReadWatch(self._socket)
 
     @property
     def live(self) -> bool:
         """Whether the bus takes what is published now."""
-        raise NotImplementedError
+        self._notice()
+        return self._live
 
     async def ready(self, timeout_s: float = 5.0) -> None:
         """Wait until the bus is there: nothing published after that is lost to a slow start. Raises NotReady."""
+        try:
+            async with asyncio.timeout(timeout_s):
+                while not self.live:
+                    await self._watch.readable()
+        except TimeoutError:
+            raise NotReady(f"no bus answers at {self._endpoint}: is the service running?") from None
 
     def wait_ready(self, timeout_s: float = 5.0) -> None:
         """``ready`` without an event loop. Raises NotReady."""
+        deadline = time.monotonic() + timeout_s
+        while not self.live:
+            left_ms = int((deadline - time.monotonic()) * 1000)
+            if left_ms <= 0 or not self._socket.poll(left_ms):
+                raise NotReady(f"no bus answers at {self._endpoint}: is the service running?")
 
     def publish(
         self, user: str, stream: str, t: int, data: Any, valid: bool = True, t_pub: int | None = None
@@ -52,14 +82,59 @@ class Publisher:
 
         Never blocks. Raises EncodeError, TopicError: what no receiver would take is neither sent nor numbered.
         """
-        raise NotImplementedError
+        key = (user, stream)
+        seq = self._seq.get(key, 0)
+        if self._healthy is not None:
+            valid = valid and self._healthy()
+        message = Message(
+            user, stream, self.src, self.sid, seq, t, self._clock() if t_pub is None else t_pub, valid, data
+        )
+        frames = encode(message)
+        self._seq[key] = seq + 1
+        self.send_frames(frames)
+        return message
 
-    def send(self, message: Message) -> None:
+    def send(self, message: Message) -> bool:
         """Send a message as it is, with its own ``src``, ``sid`` and ``seq`` (replay). Raises as ``publish``."""
+        return self.send_frames(encode(message))
 
     def send_frames(self, frames: tuple[bytes, bytes]) -> bool:
         """Send a message's bytes as they are. Says whether the bus took them."""
-        raise NotImplementedError
+        if not self.live:
+            self.drops[NO_BUS] += 1
+            return False
+        try:
+            self._socket.send_multipart(frames, zmq.NOBLOCK)
+        except zmq.Again:
+            self.drops[FULL] += 1
+            return False
+        self.sent += 1
+        return True
 
     def close(self, linger_s: float = 1.0) -> None:
         """Close; what was sent may take so long to leave."""
+        if not self._socket.closed:
+            self._watch.close()
+            self._socket.close(int(linger_s * 1000))
+
+    def _notice(self) -> None:
+        while self._watch.has_input:
+            frames = self._socket.recv_multipart(zmq.NOBLOCK)
+            if frames == [SUBSCRIBE_ALL]:
+                self._live = True
+                self.connections += 1
+            elif frames == [UNSUBSCRIBE_ALL]:
+                self._live = False
+
+
+def _socket(context: Context, endpoint: str) -> Socket:
+    socket = context.socket(zmq.XPUB)
+    socket.set_hwm(HWM)
+    # The pipe ends with the connection, which the socket reports as the bus's unsubscription. With the pipe kept,
+    # 10,000 old samples would be held back and burst onto a bus that comes back.
+    socket.setsockopt(zmq.IMMEDIATE, 1)
+    socket.setsockopt(zmq.XPUB_NODROP, 1)
+    if "[" in endpoint:
+        socket.setsockopt(zmq.IPV6, 1)
+    socket.connect(endpoint)
+    return socket

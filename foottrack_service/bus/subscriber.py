@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
+import time
+import uuid
 from collections.abc import AsyncIterator, Iterable
 from typing import NamedTuple
 
-from foottrack_protocol.envelope import Message
-from foottrack_protocol.topics import Policy
+import zmq
+
+from foottrack_protocol.envelope import Message, decode
+from foottrack_protocol.errors import DecodeError
+from foottrack_protocol.topics import WELCOME, Policy
 from foottrack_service.bus.clock import BusClock, now
-from foottrack_service.bus.endpoints import Context
+from foottrack_service.bus.endpoints import HWM, MAX_FRAME_BYTES, Context, Socket
+from foottrack_service.bus.errors import NotReady
 from foottrack_service.bus.sequence import Stats
+from foottrack_service.bus.watch import ReadWatch
 
 BATCH = 64
 """Messages taken from the socket before the event loop gets its turn: below 1 ms of decoding."""
+
+_LOG_PERIOD_NS = 1_000_000_000
+_log = logging.getLogger(__name__)
 
 
 class Received(NamedTuple):
@@ -42,21 +54,59 @@ class Subscriber:
         self.policy = policy
         self.stats = Stats()
         self.connections = 0
+        self._endpoint = endpoint
+        self._clock = clock
+        self._token = b""
+        self._early: list[Received] = []
+        self._last_log: int | None = None
+        self._socket = _socket(context, endpoint, topics)
+        self._watch = ReadWatch(self._socket)
 
     async def ready(self, timeout_s: float = 5.0) -> None:
-        """Wait until the bus knows the subscription. Raises NotReady."""
+        """Wait until the bus knows the subscription: nothing published after that is missed. Raises NotReady."""
+        try:
+            async with asyncio.timeout(timeout_s):
+                while not self._greeted():
+                    await self._watch.readable()
+        except TimeoutError:
+            raise NotReady(f"no bus answers at {self._endpoint}: is the service running?") from None
 
     def wait_ready(self, timeout_s: float = 5.0) -> None:
         """``ready`` without an event loop. Raises NotReady."""
+        deadline = time.monotonic() + timeout_s
+        while not self._greeted():
+            left_ms = int((deadline - time.monotonic()) * 1000)
+            if left_ms <= 0 or not self._socket.poll(left_ms):
+                raise NotReady(f"no bus answers at {self._endpoint}: is the service running?")
 
     def drain(self, limit: int = BATCH) -> list[Received]:
         """What is there now, without waiting; at most ``limit`` messages leave the socket."""
-        raise NotImplementedError
+        received, self._early = self._early, []
+        self._receive(received, limit)
+        return list(_newest(received).values()) if self.policy is Policy.LATEST else received
 
     async def batches(self) -> AsyncIterator[list[Received]]:
-        """What came since the last batch, never empty; gives the event loop its turn between batches."""
-        raise NotImplementedError
-        yield []
+        """What came since the last batch, never empty; gives the event loop its turn between batches.
+
+        Ends when the subscriber is closed. LATEST reads until nothing is left before it gives the newest, so a
+        reader that was held up does not work off a backlog.
+        """
+        while not self._socket.closed:
+            batch, self._early = self._early, []
+            taken = self._receive(batch, BATCH)
+            if self.policy is Policy.LATEST:
+                newest = _newest(batch)
+                total = taken
+                while taken == BATCH and total < HWM:
+                    await asyncio.sleep(0)
+                    batch = []
+                    taken = self._receive(batch, BATCH)
+                    newest |= _newest(batch)
+                    total += taken
+                batch = list(newest.values())
+            if batch:
+                yield batch
+            await self._watch.readable()
 
     async def __aiter__(self) -> AsyncIterator[Received]:
         async for batch in self.batches():
@@ -64,4 +114,66 @@ class Subscriber:
                 yield received
 
     def close(self) -> None:
-        """Close; what was not read is lost."""
+        """Close; what was not read is lost. Iterations end."""
+        if not self._socket.closed:
+            self._watch.close()
+            self._socket.close(0)
+
+    def _greeted(self) -> bool:
+        # Messages that come before the greeting are the reader's already.
+        while self.connections == 0 and self._receive(self._early, 1):
+            pass
+        return self.connections > 0
+
+    def _receive(self, into: list[Received], limit: int) -> int:
+        """Read up to ``limit`` messages, append what can be decoded, and say how many were read."""
+        taken = 0
+        while taken < limit and self._watch.has_input:
+            frames = self._socket.recv_multipart(zmq.NOBLOCK)
+            taken += 1
+            if len(frames) == 1 and frames[0].startswith(WELCOME):
+                self._welcomed(frames[0])
+                continue
+            arrival = self._clock()
+            try:
+                message = decode(frames)
+            except DecodeError as error:
+                self._refuse(error, arrival)
+                continue
+            self.stats.accept(message, arrival)
+            into.append(Received(message, arrival, (frames[0], frames[1])))
+        return taken
+
+    def _welcomed(self, greeting: bytes) -> None:
+        if greeting == WELCOME:
+            self._token = WELCOME + b"/" + uuid.uuid4().hex.encode()
+            self._socket.subscribe(self._token)
+        elif greeting == self._token:
+            self._socket.unsubscribe(self._token)
+            self.connections += 1
+
+    def _refuse(self, error: DecodeError, arrival: int) -> None:
+        self.stats.refuse(error)
+        if self._last_log is None or arrival - self._last_log >= _LOG_PERIOD_NS:
+            self._last_log = arrival
+            _log.warning("refused a message: %s", error)
+
+
+def _newest(received: Iterable[Received]) -> dict[bytes, Received]:
+    newest: dict[bytes, Received] = {}
+    for item in received:
+        newest.pop(item.raw[0], None)
+        newest[item.raw[0]] = item
+    return newest
+
+
+def _socket(context: Context, endpoint: str, topics: Iterable[str]) -> Socket:
+    socket = context.socket(zmq.SUB)
+    socket.set_hwm(HWM)
+    socket.setsockopt(zmq.MAXMSGSIZE, MAX_FRAME_BYTES)
+    if "[" in endpoint:
+        socket.setsockopt(zmq.IPV6, 1)
+    for topic in (WELCOME.decode(), *topics):
+        socket.subscribe(topic)
+    socket.connect(endpoint)
+    return socket
