@@ -141,6 +141,20 @@ class BusSettings(Section):
     egress: str = "tcp://127.0.0.1:7702"
     control: str = "tcp://127.0.0.1:7703"
 
+    @classmethod
+    def beginning_at(cls, where: str) -> BusSettings:
+        """Three ports in a row: ``tcp://127.0.0.1:7701``, ``127.0.0.1:7701`` or ``7701``; 0 takes free ones.
+
+        Raises ConfigError when that is no address with a port.
+        """
+        host, _, port = where.removeprefix("tcp://").rpartition(":")
+        if not port.isdecimal() or int(port) > 65533:
+            raise ConfigError(f"{where!r} is no address with a port, such as tcp://127.0.0.1:7701")
+        first = int(port)
+        ports = [0, 0, 0] if first == 0 else [first, first + 1, first + 2]
+        ingress, egress, control = (f"tcp://{host or '127.0.0.1'}:{number}" for number in ports)
+        return cls(ingress=ingress, egress=egress, control=control)
+
 
 def _user_name(name: str) -> str:
     if not is_user(name):

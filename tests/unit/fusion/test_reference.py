@@ -17,7 +17,7 @@ MS = 1_000_000
 
 
 def imu(t, acceleration=(0.0, 0.0, 0.0), q=UPRIGHT):
-    return ImuSample(t, np.array(acceleration) + [0.0, STANDARD_GRAVITY, 0.0], None, np.array(q))
+    return ImuSample(t, np.array(acceleration) + np.array([0.0, STANDARD_GRAVITY, 0.0]), None, np.array(q))
 
 
 def fix(t, p, kind="marker", q=None, head_p=(0.0, 0.0, 0.0), newest_p=None):

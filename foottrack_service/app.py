@@ -1,0 +1,160 @@
+"""The composition root: a bus, and the nodes that run on it in one process."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+from foottrack_service.bus.broker import Broker
+from foottrack_service.bus.connection import Bus
+from foottrack_service.bus.control import ControlServer
+from foottrack_service.bus.health import publish_health
+from foottrack_service.bus.log import BusLogHandler
+from foottrack_service.bus.session import SessionInfo, publish_session
+from foottrack_service.config import Settings
+from foottrack_service.fusion import node as fusion_node
+
+NodeRun = Callable[[Bus, Settings], Awaitable[None]]
+
+FIRST_BACKOFF_S = 0.5
+LONGEST_BACKOFF_S = 10.0
+
+_log = logging.getLogger(__name__)
+
+
+class NodeFailed(Exception):
+    """A node without which the service is of no use has ended; the text says which and why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A part of the service. A vital one ends the service when it fails; others are restarted."""
+
+    name: str
+    run: NodeRun
+    vital: bool = False
+
+
+NODES: dict[str, Node] = {
+    "fusion": Node("fusion", fusion_node.run, vital=True),
+}
+"""Nodes by the name that ``foottrack node NAME`` takes."""
+
+
+class Service:
+    """A bus with its control socket and the system's own topics; nodes are added to it.
+
+    An async context manager: inside, everything runs; leaving it stops all of it in order.
+    """
+
+    def __init__(self, settings: Settings, handlers: Mapping[str, Callable[..., Any]] | None = None) -> None:
+        self.settings = settings
+        self._handlers = dict(handlers or {})
+        self._broker = Broker(settings.bus)
+        self._tasks: list[asyncio.Task[None]] = []
+        self._failure: asyncio.Future[None] | None = None
+
+    async def __aenter__(self) -> Self:
+        self._broker.start()
+        try:
+            await self._open()
+        except BaseException:
+            self._broker.stop()
+            raise
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for task in reversed(self._tasks):
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        logging.getLogger().removeHandler(self._log_handler)
+        self._control.close()
+        self.bus.close()
+        self._broker.stop()
+
+    @property
+    def endpoints(self) -> Any:
+        """Where the bus listens: BusSettings with the actual ports."""
+        return self._endpoints
+
+    def start(self, node: Node) -> asyncio.Task[None]:
+        """Run a node beside the others; a device node that fails is started again with a growing pause."""
+        task = asyncio.get_running_loop().create_task(self._supervise(node), name=node.name)
+        self._tasks.append(task)
+        return task
+
+    async def failed(self) -> None:
+        """Wait until a vital node fails. Raises NodeFailed."""
+        assert self._failure is not None
+        await asyncio.shield(self._failure)
+
+    async def _open(self) -> None:
+        self._failure = asyncio.get_running_loop().create_future()
+        self.bus = Bus.connect(self._broker.inproc, self._broker.context)
+        self._session = SessionInfo([self.settings.user], self.settings.digest)
+        self._control = ControlServer(
+            self._broker.context,
+            self.settings.bus.control,
+            self._handlers,
+            session=self._session,
+            board=self.bus.health,
+        )
+        self._endpoints = self._broker.endpoints.model_copy(update={"control": self._control.endpoint})
+        system = self.bus.publisher("service")
+        monitor = self.bus.subscriber()
+        await system.ready()
+        await monitor.ready()
+        self._log_handler = BusLogHandler(system)
+        logging.getLogger().addHandler(self._log_handler)
+        loop = asyncio.get_running_loop()
+        self._tasks += [
+            loop.create_task(self._control.run(), name="control"),
+            loop.create_task(publish_session(system, self._session), name="session"),
+            loop.create_task(publish_health(system, self.bus.health, monitor), name="health"),
+        ]
+
+    async def _supervise(self, node: Node) -> None:
+        board = self.bus.health
+        pause = FIRST_BACKOFF_S
+        board.node(node.name, "starting")
+        while True:
+            started = self.bus.clock()
+            try:
+                await node.run(self.bus, self.settings)
+            except asyncio.CancelledError:
+                board.node(node.name, "stopped")
+                raise
+            except Exception as error:
+                text = _readable(error)
+                if node.vital:
+                    board.node(node.name, "failed", text)
+                    self._fail(node, error, text)
+                    return
+                _log.warning("%s failed and starts again in %.1f s: %s", node.name, pause, text)
+                board.node(node.name, "restarting", text)
+            else:
+                board.node(node.name, "stopped")
+                return
+            if (self.bus.clock() - started) * 1e-9 > LONGEST_BACKOFF_S:
+                pause = FIRST_BACKOFF_S
+            await asyncio.sleep(pause)
+            pause = min(2.0 * pause, LONGEST_BACKOFF_S)
+
+    def _fail(self, node: Node, error: Exception, text: str) -> None:
+        _log.error("%s failed: %s", node.name, text, exc_info=error)
+        assert self._failure is not None
+        with suppress(asyncio.InvalidStateError):
+            self._failure.set_exception(NodeFailed(f"{node.name}: {text}"))
+
+
+def _readable(error: BaseException) -> str:
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

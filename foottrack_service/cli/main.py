@@ -1,0 +1,39 @@
+"""``foottrack``: the command line. One module per group of commands; what is heavy is imported by who needs it."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from foottrack_protocol.errors import ProtocolError
+from foottrack_service.bus.errors import BusError
+from foottrack_service.cli import running, service, watch
+from foottrack_service.config import ConfigError
+
+app = typer.Typer(
+    name="foottrack",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Tracks a person's feet for virtual reality and streams them to any engine. Begin with: foottrack demo",
+)
+app.command()(service.run)
+app.command()(service.node)
+app.command()(watch.top)
+app.command()(watch.echo)
+
+
+def main() -> None:
+    """Entry point: errors that a person can mend are one line and an exit code, not a traceback."""
+    running.set_up_logging()
+    try:
+        app()
+    except running.CommandFailed as error:
+        running.fail(str(error), error.code)
+    except ConfigError as error:
+        running.fail(str(error), running.EXIT_USAGE)
+    except (BusError, ProtocolError) as error:
+        running.fail(str(error))
+    except BrokenPipeError:
+        sys.stderr.close()
+        raise SystemExit(0) from None

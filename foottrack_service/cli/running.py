@@ -1,0 +1,114 @@
+"""How a command runs: its settings, its event loop, Ctrl-C, and errors in one helpful line."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import signal
+import sys
+from collections.abc import Coroutine, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, NoReturn, TypeVar
+
+import typer
+
+from foottrack_service.config import BusSettings, Settings, load
+
+T = TypeVar("T")
+
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+
+ConfigOption = Annotated[
+    Path | None,
+    typer.Option("--config", "-c", help="Settings file; foottrack.toml of this folder is taken when it is there."),
+]
+UserOption = Annotated[
+    str | None, typer.Option("--user", help="Whose topics: <user>/...; the settings' user if absent.")
+]
+ConnectOption = Annotated[
+    str | None,
+    typer.Option(
+        "--connect",
+        metavar="ADDRESS",
+        help="The bus: its first port, such as 7701 or tcp://127.0.0.1:7701; the two after it are used as well.",
+    ),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
+
+
+class CommandFailed(Exception):
+    """What a person should read, and the exit code."""
+
+    def __init__(self, text: str, code: int = EXIT_FAILED) -> None:
+        super().__init__(text)
+        self.code = code
+
+
+def settings_for(config: Path | None, user: str | None = None, bus: str | None = None, **sections: Any) -> Settings:
+    """Settings with a command's flags on top. Raises ConfigError."""
+    flags: dict[str, Any] = {name: values for name, values in sections.items() if values}
+    if user is not None:
+        flags["user"] = user
+    if bus is not None:
+        flags["bus"] = BusSettings.beginning_at(bus).model_dump()
+    return load(config, flags).settings
+
+
+def run_loop(work: Coroutine[Any, Any, T]) -> T:
+    """Run to the end on a loop that can watch descriptors. Ctrl-C and SIGTERM cancel the work, which cleans up.
+
+    Raises KeyboardInterrupt after that, so that a command can end as one that was told to.
+    """
+    with asyncio.Runner(loop_factory=asyncio.SelectorEventLoop) as runner, _terminate_as_interrupt():
+        return runner.run(work)
+
+
+def print_json(values: Any) -> None:
+    """One JSON object on standard output; what is not finite is null."""
+    typer.echo(json.dumps(_finite(values), indent=2 if sys.stdout.isatty() else None))
+
+
+def set_up_logging(verbose: bool = False) -> None:
+    """Log to standard error, through rich where a person reads it."""
+    from rich.console import Console
+    from rich.logging import RichHandler
+
+    handler: logging.Handler
+    if sys.stderr.isatty():
+        handler = RichHandler(console=Console(stderr=True), show_path=False)
+        handler.setFormatter(logging.Formatter("%(message)s"))
+    else:
+        handler = logging.StreamHandler()
+        handler.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
+    logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, handlers=[handler], force=True)
+
+
+def fail(text: str, code: int = EXIT_FAILED) -> NoReturn:
+    """End the command with a line on standard error."""
+    typer.secho(f"foottrack: {text}", fg=typer.colors.RED, err=True)
+    raise SystemExit(code)
+
+
+@contextmanager
+def _terminate_as_interrupt() -> Iterator[None]:
+    def interrupt(_signal: int, _frame: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _finite(values: Any) -> Any:
+    if isinstance(values, dict):
+        return {key: _finite(value) for key, value in values.items()}
+    if isinstance(values, list | tuple):
+        return [_finite(value) for value in values]
+    if isinstance(values, float) and not (abs(values) < float("inf")):
+        return None
+    return values

@@ -1,0 +1,75 @@
+"""``foottrack run`` and ``foottrack node``."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Annotated
+
+import typer
+
+from foottrack_service.cli.running import CommandFailed, ConfigOption, ConnectOption, UserOption, run_loop, settings_for
+from foottrack_service.config import Settings
+
+
+def run(
+    config: ConfigOption = None,
+    user: UserOption = None,
+    listen: Annotated[
+        str | None, typer.Option("--listen", metavar="ADDRESS", help="First of three ports to listen on, such as 7701.")
+    ] = None,
+) -> None:
+    """Run the service: bus, fusion, and the devices of the settings. Ctrl-C ends it.
+
+    Example: foottrack run --config foottrack.toml
+    """
+    settings = settings_for(config, user, listen)
+    try:
+        run_loop(_serve(settings))
+    except KeyboardInterrupt:
+        typer.echo("Stopped.", err=True)
+
+
+def node(
+    name: Annotated[str, typer.Argument(help="Which node; an unknown name lists them.")],
+    config: ConfigOption = None,
+    user: UserOption = None,
+    connect: ConnectOption = None,
+) -> None:
+    """Run one node in this process, on a bus that runs elsewhere. Ctrl-C ends it.
+
+    Example: foottrack node fusion --connect tcp://127.0.0.1:7701
+    """
+    from foottrack_service.app import NODES
+
+    if name not in NODES:
+        raise CommandFailed(f"no node is called {name!r}; there are: {', '.join(NODES)}", 2)
+    settings = settings_for(config, user, connect)
+    try:
+        run_loop(_one_node(name, settings))
+    except KeyboardInterrupt:
+        typer.echo("Stopped.", err=True)
+
+
+async def _serve(settings: Settings) -> None:
+    from foottrack_service.app import NODES, Service
+
+    async with Service(settings) as service:
+        ends = service.endpoints
+        typer.echo(
+            f"Listening: publishers {ends.ingress}, subscribers {ends.egress}, control {ends.control}. Ctrl-C ends it.",
+            err=True,
+        )
+        for each in NODES.values():
+            service.start(each)
+        await service.failed()
+
+
+async def _one_node(name: str, settings: Settings) -> None:
+    from foottrack_service.app import NODES
+    from foottrack_service.bus.connection import Bus
+
+    with Bus.connect(settings.bus) as bus:
+        probe = bus.subscriber(["sys/session"])
+        await probe.ready()
+        typer.echo(f"{name} runs on {settings.bus.ingress}. Ctrl-C ends it.", err=True)
+        await asyncio.shield(asyncio.ensure_future(NODES[name].run(bus, settings)))

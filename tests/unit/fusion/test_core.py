@@ -1,0 +1,210 @@
+"""The fusion core: what brings on an output, what is refused, and that nothing bad gets out."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from foottrack_protocol import Message, decode, encode
+from foottrack_protocol import messages as m
+from foottrack_protocol.frames import STANDARD_GRAVITY
+from foottrack_service import rotations as rot
+from foottrack_service.config import Settings
+from foottrack_service.fusion.core import FusionCore
+from foottrack_service.fusion.offline import fuse
+
+MS = 1_000_000
+G = STANDARD_GRAVITY
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
+
+
+def message(stream, t, data, valid=True, user="user"):
+    return Message(user, stream, "test", "s", 0, t, t, valid, data)
+
+
+def imu(t, side="left", acc=(0.0, G, 0.0), q=IDENTITY, valid=True, user="user"):
+    return message(f"imu/{side}", t, m.Imu(acc=acc, q=q, t_arr=t), valid, user)
+
+
+def head(t, p=(0.0, 1.6, 0.0), tracked=True, origin=0, moved=None):
+    body = m.HeadPose(p=p, q=IDENTITY, tracked=tracked, origin=origin, moved=moved)
+    return message("head/pose", t, body)
+
+
+def marker(t, p, side="left", q=None):
+    body = m.Optical(p=p, q=q, cov=(1e-4, 0, 0, 1e-4, 0, 1e-4), edge_px=50.0, frame=0)
+    return message(f"marker/{side}", t, body)
+
+
+def feed(core, messages):
+    return [out for each in messages for out in core.handle(each, each.t)]
+
+
+def test_an_imu_alone_brings_its_foot_and_no_legs():
+    (out,) = feed(FusionCore(Settings()), [imu(0)])
+    assert (out.topic, out.src, out.sid, out.seq, out.t, out.t_pub) == ("user/pose/body", "fusion", "offline", 0, 0, 0)
+    body = out.data
+    assert (body.head, body.hips, body.right) == (None, None, None)
+    assert (body.left.hip, body.left.knee) == (None, None)
+    assert np.allclose(body.left.ankle.p, (-0.1, 0.09, 0.0))
+    assert np.allclose(body.left.toe, (-0.1, 0.02, -0.19))
+
+
+def test_head_and_tags_alone_bring_legs():
+    core = FusionCore(Settings())
+    outs = feed(core, [head(0), marker(0, (-0.1, -1.5, -0.15)), marker(0, (0.1, -1.5, -0.15), side="right")])
+    outs += core.tick(core.deadline)
+    body = outs[-1].data
+    assert body.head.p == (0.0, 1.6, 0.0)
+    assert body.left.stage == body.right.stage == "marker"
+    skeleton = core._skeleton
+    for leg in (body.left, body.right):
+        assert math.dist(leg.hip, leg.knee) == pytest.approx(skeleton.thigh)
+        assert math.dist(leg.knee, leg.ankle.p) == pytest.approx(skeleton.shank)
+        assert leg.knee[2] < max(leg.hip[2], leg.ankle.p[2])
+    assert math.dist(body.left.hip, body.right.hip) == pytest.approx(skeleton.hip_width)
+
+
+def test_outputs_come_on_data_but_no_faster_than_the_limit_and_by_the_timer_in_silence():
+    core = FusionCore(Settings())
+    stamps = [out.t for out in feed(core, [imu(t * MS) for t in (0, 2, 4, 5, 9, 10, 30)])]
+    assert stamps == [0, 5 * MS, 10 * MS, 30 * MS]
+    assert core.deadline == 50 * MS
+    assert core.tick(49 * MS) == []
+    (out,) = core.tick(50 * MS)
+    assert out.t == 50 * MS
+
+
+def test_offline_the_timer_runs_in_virtual_time():
+    outs = list(fuse([(each.t, each) for each in (imu(0), imu(65 * MS))], FusionCore(Settings())))
+    assert [out.t // MS for out in outs] == [0, 20, 40, 60, 65]
+    assert [out.seq for out in outs] == [0, 1, 2, 3, 4]
+
+
+def test_nothing_is_published_before_something_is_known():
+    core = FusionCore(Settings())
+    assert core.deadline is None
+    assert core.tick(10**12) == []
+
+
+def test_invalid_messages_and_other_users_are_not_used():
+    core = FusionCore(Settings())
+    assert feed(core, [imu(0, valid=False), imu(0, user="other")]) == []
+    assert core.health["user/left"].rejected == {"invalid": 1}
+
+
+@pytest.mark.parametrize("acc", [(1e300, 0.0, 0.0), (0.0, -1e5, 0.0)])
+def test_what_no_foot_can_feel_is_counted_and_left_out(acc):
+    core = FusionCore(Settings())
+    feed(core, [imu(0), imu(10 * MS, acc=acc)])
+    assert core.health["user/left"].rejected == {"implausible": 1}
+    assert core.health["user/left"].accepted == {"imu": 1}
+
+
+def test_a_fix_without_a_head_is_rejected_as_such():
+    core = FusionCore(Settings())
+    feed(core, [imu(0), marker(0, (0.0, -1.5, 0.0))])
+    assert core.health["user/left"].rejected == {"no_head_pose": 1}
+
+
+def test_without_a_fresh_head_legs_are_nil_and_feet_still_come():
+    core = FusionCore(Settings())
+    outs = feed(core, [head(0), imu(10 * MS), imu(200 * MS)])
+    assert outs[-2].data.hips is not None
+    assert outs[-1].data.hips is None and outs[-1].data.left is not None
+
+
+def test_a_known_recentring_moves_everything_rigidly():
+    core = FusionCore(Settings())
+    turn = rot.from_yaw(0.5)
+    moved = m.Pose(p=(1.0, 0.0, -2.0), q=tuple(turn.tolist()))
+    before = feed(core, [head(0), marker(0, (-0.1, -1.5, -0.15)), imu(10 * MS)])[-1]
+    core.handle(
+        head(12 * MS, p=tuple(np.array([1, 0, -2]) + rot.rotate(turn, [0, 1.6, 0])), origin=1, moved=moved), 12 * MS
+    )
+    after = core.tick(core.deadline)[-1]
+    expected = np.array([1, 0, -2]) + rot.rotate(turn, before.data.left.ankle.p)
+    assert np.allclose(after.data.left.ankle.p, expected, atol=1e-3)
+
+
+def test_an_unknown_recentring_begins_again_and_never_drifts_across():
+    core = FusionCore(Settings())
+    feed(core, [head(0), marker(0, (-0.1, -1.5, -0.15)), head(2 * MS, p=(5.0, 1.6, 5.0), origin=1)])
+    assert core.tick(core.deadline)[-1].data.left is None
+    out = feed(core, [marker(40 * MS, (-0.1, -1.5, -0.15)), imu(41 * MS)])[-1]
+    assert math.dist(out.data.left.ankle.p, (4.9, 0.1, 5.0)) < 0.2
+
+
+def test_calibrations_are_applied_when_they_arrive():
+    core = FusionCore(Settings())
+    values = m.BodyValues(height=1.8, thigh=0.5, shank=0.4, torso=0.7, hip_width=0.3, hip_back=0.1)
+    floor = m.FloorCalibration(values=m.FloorValues(height=0.25))
+    outs = feed(
+        core,
+        [
+            message("calibration", 0, m.BodyCalibration(values=values)),
+            message("calibration", 0, floor),
+            imu(0),
+            head(0, p=(0.0, 1.9, 0.0)),
+            imu(10 * MS),
+        ],
+    )
+    assert outs[0].data.left.ankle.p[1] == pytest.approx(0.34)
+    leg = outs[-1].data.left
+    assert math.dist(leg.hip, leg.knee) == pytest.approx(0.5)
+
+
+def test_a_mount_correction_counts_only_for_the_mount_it_was_found_for():
+    config = Settings()
+    for base, shift in (("another", 0.0), (config.camera.mount_hash, 0.1)):
+        core = FusionCore(config)
+        values = m.MountValues(p=(0.1, 0, 0), q=IDENTITY, sigma_p=1e-3, sigma_q=1e-3, base=base)
+        out = feed(
+            core,
+            [
+                message("calibration", 0, m.MountCalibration(values=values)),
+                head(0),
+                marker(0, (0.0, -1.5, 0.0)),
+                imu(1),
+            ],
+        )[-1]
+        assert out.data.left.ankle.p[0] == pytest.approx(shift, abs=1e-3)
+
+
+finite = st.floats(-1e4, 1e4)
+stamps = st.integers(-(10**10), 10**10)
+events = st.one_of(
+    st.builds(
+        lambda t, a, s: imu(t, s, a), stamps, st.tuples(finite, finite, finite), st.sampled_from(["left", "right"])
+    ),
+    st.builds(lambda t, p, s: marker(t, p, s, IDENTITY), stamps, st.tuples(finite, finite, finite), st.just("left")),
+    st.builds(lambda t, p, o: head(t, p, origin=o), stamps, st.tuples(finite, finite, finite), st.integers(0, 2)),
+    st.builds(lambda t: head(t, tracked=False), stamps),
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(st.tuples(events, st.integers(0, 10**8)), max_size=40))
+def test_whatever_comes_only_valid_messages_leave(sequence):
+    core = FusionCore(Settings())
+    now, arrivals = 0, []
+    for each, step in sequence:
+        now += step
+        arrivals.append((now, each))
+    for out in fuse(arrivals, core):
+        assert decode(encode(out)) == out
+
+
+def test_the_same_messages_give_the_same_bytes():
+    rng = np.random.default_rng(3)
+    sequence = []
+    for k in range(300):
+        t = k * 5 * MS
+        sequence.append((t, head(t)))
+        sequence.append((t, imu(t, acc=tuple(rng.normal(0, 3, 3) + [0, G, 0]))))
+        sequence.append((t, marker(t - 30 * MS, tuple(rng.normal(0, 0.01, 3) + [0, -1.5, 0]), q=IDENTITY)))
+    first, second = ([encode(out) for out in fuse(sequence, FusionCore(Settings()))] for _ in range(2))
+    assert len(first) > 250
+    assert first == second
