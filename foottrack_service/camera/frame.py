@@ -33,7 +33,7 @@ class Frame:
 
     def row_time(self, row: float) -> int:
         """Bus-clock ns of mid-exposure of one row (a fraction is fine)."""
-        rows = self.gray.shape[0]
+        rows = int(self.gray.shape[0])
         return self.t + round((row - 0.5 * (rows - 1)) / max(rows - 1, 1) * self.readout * 1e9)
 
 
@@ -41,7 +41,7 @@ class SourceError(Exception):
     """A camera could not be opened, or went away. The text says what to do about it."""
 
 
-class SourceEnded(Exception):  # noqa: N818 - an end is not an error
+class SourceEnded(Exception):
     """A recorded sequence has no more pictures."""
 
 

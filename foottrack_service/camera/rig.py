@@ -110,11 +110,11 @@ class Rig:
 
     def to_head(self, p_cv: npt.ArrayLike) -> Array:
         """Points, shape (..., 3), m, from OpenCV's camera frame to the head frame."""
-        return np.asarray(p_cv, dtype=np.float64) @ self.R_cv.T + np.asarray(self.mount_p)
+        return np.asarray(np.asarray(p_cv, dtype=np.float64) @ self.R_cv.T + np.asarray(self.mount_p))
 
     def from_head(self, p_head: npt.ArrayLike) -> Array:
         """Points, shape (..., 3), m, from the head frame to OpenCV's camera frame."""
-        return (np.asarray(p_head, dtype=np.float64) - np.asarray(self.mount_p)) @ self.R_cv
+        return np.asarray((np.asarray(p_head, dtype=np.float64) - np.asarray(self.mount_p)) @ self.R_cv)
 
     def rotation_to_head(self, q: npt.ArrayLike) -> Array:
         """Rotation(s) body to OpenCV's camera, shape (..., 4), as body to head."""
@@ -122,4 +122,4 @@ class Rig:
 
     def covariance_to_head(self, cov: Array) -> Array:
         """Covariance of a position, shape (3, 3), m^2, turned from OpenCV's camera frame to the head's."""
-        return self.R_cv @ cov @ self.R_cv.T
+        return np.asarray(self.R_cv @ cov @ self.R_cv.T)

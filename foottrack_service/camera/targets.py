@@ -24,7 +24,7 @@ class Tag:
         """(4, 3) m in the target's frame, in OpenCV's order: from the tag's top left clockwise."""
         half = 0.5 * self.size
         square = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
-        return rotations.rotate(rotations.normalised(self.q), square) + np.asarray(self.p)
+        return np.asarray(rotations.rotate(rotations.normalised(self.q), square) + np.asarray(self.p))
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,7 @@ def draw_depth(
     """True inverse depth (h, w), 1/m, 0 at infinity, of shoes at (place, rotation) in the stage, from a camera."""
     place, R = camera
     size = (intrinsics.height, intrinsics.width)
-    to_rays = np.linalg.inv(intrinsics.matrix)
+    to_rays: Array = np.asarray(np.linalg.inv(intrinsics.matrix), dtype=np.float64)
     inverse = np.maximum(_plane((R @ to_rays)[1] / (floor_height - place[1]), 0, 0, size), 0.0)
     for shoe, p, R_foot in shoes:
         bodies = [(solid.vertices, solid.faces) for solid in shoe.solids]

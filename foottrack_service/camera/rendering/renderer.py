@@ -24,6 +24,7 @@ _SUPERSAMPLING = 2
 _NEAR_M = 0.05
 _SKY = 150
 _SHIFT = 4
+_DEPTH = DepthModel()
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class Renderer:
         rig: Rig,
         shutter: Shutter = Shutter(),
         picture: PictureModel = PictureModel(),
-        depth: DepthModel | None = DepthModel(),
+        depth: DepthModel | None = _DEPTH,
         seed: int = 0,
     ) -> None:
         self.scene, self.rig, self.shutter = scene, rig, shutter
@@ -74,7 +75,7 @@ class Renderer:
         for side in far_first:
             self._draw_shoe(picture, shoes[side], feet[side], head, t)
         if self._picture.psf > 0.0:
-            picture = cv2.GaussianBlur(picture, (0, 0), self._picture.psf)
+            picture = np.asarray(cv2.GaussianBlur(picture, (0, 0), self._picture.psf), dtype=np.uint8)
         picture = self._noise.apply(picture, self._picture.read_noise, self._picture.shot_noise)
         if self._depth is None:
             return picture, None
@@ -128,11 +129,11 @@ class Renderer:
         turned = head.at(ends)[1]
         motion = intrinsics.focal * np.linalg.norm(turned[1] - turned[0]) / np.sqrt(2.0)
         passes = int(np.clip(np.ceil(motion / 2.0), 1, 4))
-        instants = np.linspace(*ends, 2 * passes + 1)[1::2]
+        instants = np.linspace(t - half, t + half, 2 * passes + 1)[1::2]
         drawn = [self._floor_at(*self._camera(*(part[0] for part in head.at(np.array([at]))))) for at in instants]
         if passes == 1:
             return drawn[0]
-        return np.mean(drawn, axis=0).astype(np.uint8)
+        return np.asarray(np.mean(drawn, axis=0), dtype=np.uint8)
 
     def _floor_at(self, place: Array, R: Array) -> npt.NDArray[np.uint8]:
         intrinsics = self.rig.intrinsics
@@ -173,7 +174,7 @@ class Renderer:
         under = cv2.resize(roi, size, interpolation=cv2.INTER_NEAREST)
         total = np.zeros(under.shape, dtype=np.float32)
         for instant in pixels:
-            canvas = under.copy()
+            canvas = np.array(under, dtype=np.uint8)
             _draw_instant(canvas, shoe, instant)
             cv2.accumulate(canvas, total)
         mean = cv2.resize(total / count, (roi.shape[1], roi.shape[0]), interpolation=cv2.INTER_AREA)

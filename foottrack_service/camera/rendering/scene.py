@@ -100,7 +100,7 @@ def _print(cells: npt.NDArray[np.uint8]) -> tuple[npt.NDArray[np.uint8], ...]:
     level = np.kron(paper, np.ones((_TAG_PX_PER_CELL, _TAG_PX_PER_CELL), dtype=np.uint8))
     levels = [level]
     while level.shape[0] > 2 * paper.shape[0]:
-        level = cv2.resize(level, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+        level = np.asarray(cv2.resize(level, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
         levels.append(level)
     return tuple(levels)
 

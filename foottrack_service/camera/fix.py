@@ -1,0 +1,52 @@
+"""What a tracker found in one picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from foottrack_service.rotations import Array
+
+
+@dataclass(frozen=True)
+class Fix:
+    """A target's place as the wire's `Optical` body has it, and what the overlay draws.
+
+    `t` bus-clock ns of the target's own rows; `p` (3,) m, `q`, `q_alt` (4,) or None, `cov` (3, 3) m^2 in the head
+    frame; `outline` (n, 2) px is what was seen in the picture, `label` says what.
+    """
+
+    side: str
+    kind: Literal["marker", "depth"]
+    t: int
+    frame: int
+    p: Array
+    q: Array | None
+    q_alt: Array | None
+    cov: Array
+    size_ratio: float | None
+    reproj_px: float | None
+    edge_px: float
+    outline: Array
+    label: str
+
+    def body(self) -> dict[str, Any]:
+        """The message's `data`, in plain floats."""
+        upper = self.cov[np.triu_indices(3)]
+        return {
+            "p": self.p.tolist(),
+            "q": None if self.q is None else self.q.tolist(),
+            "q_alt": None if self.q_alt is None else self.q_alt.tolist(),
+            "cov": upper.tolist(),
+            "size_ratio": self.size_ratio,
+            "reproj_px": self.reproj_px,
+            "edge_px": self.edge_px,
+            "frame": self.frame,
+        }
+
+
+def edge_distance(outline: Array, width: int, height: int) -> float:
+    """Least distance of points (n, 2), px, to the picture's border; negative outside."""
+    return float(min(outline.min(), (width - 1 - outline[:, 0]).min(), (height - 1 - outline[:, 1]).min()))

@@ -1,0 +1,140 @@
+"""Follows the tags from picture to picture: windows where they should be, the whole picture only when one is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from foottrack_service.camera.detector import Detection, TagDetector, Window
+from foottrack_service.camera.fix import Fix, edge_distance
+from foottrack_service.camera.frame import Frame
+from foottrack_service.camera.pose import CORNER_SIGMA_PX, solve_target
+from foottrack_service.camera.ranging import join_depth
+from foottrack_service.camera.rig import Rig
+from foottrack_service.camera.targets import Target, owners
+from foottrack_service.rotations import Array
+
+LOST_AFTER_S = 0.1
+"""How long a tag is expected where it was heading before the whole picture is searched."""
+SEARCH_PERIOD_S = 0.05
+"""A whole picture costs ten windows: while a tag is lost, one is searched so often."""
+DEPTH_NOISE = 0.0038
+"""Standard deviation of a depth pixel at 1 m, m: 0.08 px of disparity of a D435 at 848 px."""
+
+_SPEED_M_S = 5.0
+_ACCELERATION_M_S2 = 150.0
+"""What foot and head together may do between two pictures; it widens the windows."""
+_MARGIN_PX = 6.0
+_BLUR_NOISE = 0.14
+"""Corner noise per px of motion blur (measured on rendered pictures: 0.5 px at 4 px of blur, 1.2 at 8)."""
+
+
+@dataclass
+class _Track:
+    """What is known of one target: OpenCV's camera frame, m, m/s; `t` ns; no velocity after one sighting."""
+
+    t: int
+    p: Array
+    v: Array | None
+
+
+class MarkerTracker:
+    """One per camera. Feed it every picture, in order."""
+
+    def __init__(self, rig: Rig, dictionary: Any, targets: Sequence[Target], depth_noise: float = DEPTH_NOISE) -> None:
+        self._rig, self._targets, self._noise = rig, tuple(targets), depth_noise
+        self._detector = TagDetector(dictionary, owners(targets))
+        self._tracks: dict[str, _Track] = {}
+        self._searched: int | None = None
+        self.windows: dict[str, Window] = {}
+        """Where the last picture was looked at, per side; a side that is missing was searched for everywhere."""
+
+    def process(self, frame: Frame) -> list[Fix]:
+        """The targets found in a picture."""
+        self.windows = {}
+        fixes: list[Fix] = []
+        lost = []
+        for target in self._targets:
+            window = self._window(target, frame)
+            if window is None:
+                lost.append(target)
+                continue
+            self.windows[target.side] = window
+            fixes += self._resolve(target, self._detector.look(frame.gray, window), frame)
+        if lost and self._search_is_due(frame.t):
+            self._searched = frame.t
+            everywhere = self._detector.search(frame.gray)
+            for target in lost:
+                fixes += self._resolve(target, everywhere, frame)
+        return fixes
+
+    def _search_is_due(self, t: int) -> bool:
+        return self._searched is None or not 0 <= t - self._searched < SEARCH_PERIOD_S * 1e9
+
+    def _window(self, target: Target, frame: Frame) -> Window | None:
+        track = self._tracks.get(target.side)
+        if track is None:
+            return None
+        dt = (frame.t - track.t) * 1e-9
+        if not 0.0 < dt <= LOST_AFTER_S:
+            return None
+        p = track.p if track.v is None else track.p + track.v * dt
+        if p[2] < 0.1:
+            return None
+        drift = 0.5 * _ACCELERATION_M_S2 * dt * dt if track.v is not None else _SPEED_M_S * dt
+        focal, (width, height) = self._rig.intrinsics.focal, frame.gray.shape[::-1]
+        half = 1.3 * target.radius * focal / p[2] + _MARGIN_PX + min(drift, _SPEED_M_S * dt) * focal / p[2]
+        centre = self._rig.intrinsics.project(p[None])[0]
+        left, top = (int(max(0.0, c - half)) for c in centre)
+        right, bottom = (int(min(size, c + half + 1.0)) for c, size in zip(centre, (width, height), strict=True))
+        if right <= left or bottom <= top:
+            return None
+        return Window(left, top, right, bottom, min(target.sizes.values()) * focal / float(p[2]))
+
+    def _resolve(self, target: Target, detections: Sequence[Detection], frame: Frame) -> list[Fix]:
+        seen = [d for d in detections if d.id in target.corners]
+        blur = self._blur_px(target, frame)
+        sigma = float(np.hypot(CORNER_SIGMA_PX, _BLUR_NOISE * blur))
+        pose = solve_target(target, seen, self._rig.intrinsics, sigma)
+        if pose is None:
+            return []
+        p, cov, ratio = join_depth(pose, target, seen, frame, self._noise)
+        outline = np.concatenate([d.corners for d in seen])
+        t = frame.row_time(float(outline[:, 1].mean()))
+        self._follow(target, t, p)
+        height, width = frame.gray.shape
+        rig = self._rig
+        return [
+            Fix(
+                side=target.side,
+                kind="marker",
+                t=t,
+                frame=frame.number,
+                p=rig.to_head(p),
+                q=rig.rotation_to_head(pose.q),
+                q_alt=None if pose.q_alt is None else rig.rotation_to_head(pose.q_alt),
+                cov=rig.covariance_to_head(cov),
+                size_ratio=ratio,
+                reproj_px=pose.reproj_px,
+                edge_px=edge_distance(outline, width, height),
+                outline=outline,
+                label=f"{target.side} {'+'.join(str(d.id) for d in seen)} {p[2]:.2f} m",
+            )
+        ]
+
+    def _blur_px(self, target: Target, frame: Frame) -> float:
+        track = self._tracks.get(target.side)
+        if track is None or track.v is None:
+            return 0.0
+        across = track.v[:2] - track.v[2] * track.p[:2] / track.p[2]
+        return float(np.linalg.norm(across)) * frame.exposure * self._rig.intrinsics.focal / float(track.p[2])
+
+    def _follow(self, target: Target, t: int, p: Array) -> None:
+        before = self._tracks.get(target.side)
+        v = None
+        if before is not None and 0 < t - before.t <= LOST_AFTER_S * 1e9:
+            v = (p - before.p) / ((t - before.t) * 1e-9)
+        self._tracks[target.side] = _Track(t, p, v)

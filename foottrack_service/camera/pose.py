@@ -1,0 +1,144 @@
+"""Pose of a target from the corners of its tags: both planar solutions, and an honest covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+
+from foottrack_service import rotations
+from foottrack_service.camera.detector import Detection
+from foottrack_service.camera.rig import Intrinsics
+from foottrack_service.camera.targets import Target
+from foottrack_service.rotations import Array
+
+CORNER_SIGMA_PX = 0.25
+"""Noise of a refined corner of a sharp tag, px per axis."""
+_CONFIDENCE = 4.0
+"""Weight of that figure against what the residuals of one picture say, in degrees of freedom."""
+_SAME_RAD = 0.03
+_WORSE = 6.0
+"""An alternative whose residuals are so many times larger is none."""
+_NEAREST_M = 1e-3
+_IDENTITY = np.eye(3)
+_CRITERIA = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 10, 1e-9)
+
+
+@dataclass(frozen=True)
+class TargetPose:
+    """A target in OpenCV's camera frame.
+
+    `p` (3,) m, `q` (4,) target to camera with the smaller residual, `q_alt` the other solution or None, `cov` (3, 3)
+    m^2 of `p` from the corners' noise, `reproj_px` rms residual of the corners.
+    """
+
+    p: Array
+    q: Array
+    q_alt: Array | None
+    cov: Array
+    reproj_px: float
+
+
+@dataclass(frozen=True)
+class _Fit:
+    rotvec: Array
+    R: Array
+    p: Array
+    squares: float
+    cov: Array
+
+
+def solve_target(
+    target: Target, seen: Sequence[Detection], intrinsics: Intrinsics, sigma_px: float = CORNER_SIGMA_PX
+) -> TargetPose | None:
+    """Pose of a target from at least one of its tags; None when no pose before the camera explains the corners.
+
+    Each tag gives the two solutions of IPPE; each is refined over the corners of *all* tags seen, which leaves one
+    where the tags do not lie in one plane. Least squares in undistorted pixels (rays times focal length), whose noise
+    is taken to be `sigma_px` until the residuals say more.
+    """
+    if not seen:
+        return None
+    model = np.concatenate([target.corners[d.id] for d in seen])
+    rays = intrinsics.rays(np.concatenate([d.corners for d in seen]))
+    best_first = sorted(range(len(seen)), key=lambda i: -seen[i].side_px)
+    fits: list[_Fit] = []
+    for i in best_first[:2]:
+        tag = next(tag for tag in target.tags if tag.id == seen[i].id)
+        for R_tag, p_tag in _ippe(tag.size, rays[4 * i : 4 * i + 4]):
+            R = R_tag @ _matrix(tag.q).T
+            fit = _refine(R, p_tag - R @ np.asarray(tag.p), model, rays, intrinsics.focal, sigma_px)
+            if fit is not None and not any(_same(fit, other) for other in fits):
+                fits.append(fit)
+    if not fits:
+        return None
+    fits.sort(key=lambda fit: fit.squares)
+    first = fits[0]
+    floor = sigma_px**2 * len(rays)
+    second = next((fit for fit in fits[1:] if fit.squares < _WORSE**2 * (first.squares + floor)), None)
+    cov = first.cov
+    if second is not None:
+        # The position lies between the two solutions, and which is right is not known here.
+        apart = second.p - first.p
+        cov = cov + 0.25 * np.outer(apart, apart)
+    return TargetPose(
+        first.p,
+        rotations.from_rotation_vector(first.rotvec),
+        None if second is None else rotations.from_rotation_vector(second.rotvec),
+        cov,
+        float(np.sqrt(first.squares / len(rays))),
+    )
+
+
+def _ippe(size: float, rays: Array) -> list[tuple[Array, Array]]:
+    half = 0.5 * size
+    square = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
+    count, rotvecs, places, _ = cv2.solvePnPGeneric(
+        square, rays.reshape(4, 1, 2), _IDENTITY, None, flags=cv2.SOLVEPNP_IPPE_SQUARE
+    )
+    found = []
+    for i in range(count):
+        rotvec, place = _vector(rotvecs[i]), _vector(places[i])
+        if np.all(np.isfinite(rotvec)) and np.all(np.isfinite(place)) and place[2] > 0.0:
+            found.append((np.asarray(cv2.Rodrigues(rotvec)[0], dtype=np.float64), place))
+    return found
+
+
+def _refine(R: Array, p: Array, model: Array, rays: Array, focal: float, sigma_px: float) -> _Fit | None:
+    start = cv2.Rodrigues(R)[0].reshape(3, 1)
+    rotvec, place = cv2.solvePnPRefineLM(model, rays, _IDENTITY, None, start, p.reshape(3, 1).copy(), _CRITERIA)
+    rotvec, place = _vector(rotvec), _vector(place)
+    if not (np.all(np.isfinite(rotvec)) and np.all(np.isfinite(place))):
+        return None
+    R = np.asarray(cv2.Rodrigues(rotvec)[0], dtype=np.float64)
+    if np.min(model @ R[2] + place[2]) <= _NEAREST_M:
+        return None
+    projected, jacobian = cv2.projectPoints(model, rotvec, place, _IDENTITY, None)
+    residual = focal * (projected.reshape(-1, 2) - rays).ravel()
+    jacobian = focal * jacobian[:, :6]
+    squares = float(residual @ residual)
+    # A prior on the corners' noise, updated by this picture's own residuals: blur shows in them.
+    variance = (_CONFIDENCE * sigma_px**2 + squares) / (_CONFIDENCE + residual.size - 6)
+    try:
+        cov = variance * np.linalg.inv(jacobian.T @ jacobian)[3:, 3:]
+    except np.linalg.LinAlgError:
+        return None
+    if not np.all(np.isfinite(cov)):
+        return None
+    return _Fit(rotvec, R, place, squares, 0.5 * (cov + cov.T))
+
+
+def _matrix(q: tuple[float, float, float, float]) -> Array:
+    return np.eye(3) if q == (0.0, 0.0, 0.0, 1.0) else rotations.to_matrix(rotations.normalised(q))
+
+
+def _vector(column: Any) -> Array:
+    return np.asarray(column, dtype=np.float64).reshape(3)
+
+
+def _same(a: _Fit, b: _Fit) -> bool:
+    # |A - B|^2 of two rotations is 8 sin^2(angle / 2).
+    return bool(np.linalg.norm(a.R - b.R) < np.sqrt(2.0) * _SAME_RAD)
