@@ -167,7 +167,7 @@ def test_a_mount_correction_counts_only_for_the_mount_it_was_found_for():
                 message("calibration", 0, m.MountCalibration(values=values)),
                 head(0),
                 marker(0, (0.0, -1.5, 0.0)),
-                imu(1),
+                imu(10 * MS),
             ],
         )[-1]
         assert out.data.left.ankle.p[0] == pytest.approx(shift, abs=1e-3)
