@@ -69,7 +69,7 @@ class BareRecording(Recording):
                 if len(pending) > 2 * MAX_PAYLOAD_BYTES + _READ_BYTES:
                     raise RecordingError(self.path, "a value larger than any message", offset)
             if pending:
-                raise RecordingError(self.path, "the last message is torn, try `foottrack log recover`", offset)
+                raise RecordingError(self.path, "the last message is torn", offset)
 
     def span(self) -> Span | None:
         """From the first to the last arrival: reads all of it."""

@@ -88,11 +88,10 @@ def records(stream: BinaryIO, path: Path) -> Iterator[Record]:
     while True:
         head = stream.read(_HEAD.size)
         if len(head) < _HEAD.size:
-            raise RecordingError(path, "the file ends here: it is torn, try `foottrack log recover`", offset)
+            raise RecordingError(path, "the file ends here, torn", offset)
         opcode, length = _HEAD.unpack(head)
         if opcode == 0 or offset + _HEAD.size + length > size:
-            detail = f"record of kind {opcode} and {length} bytes does not fit: torn or damaged"
-            raise RecordingError(path, f"{detail}, try `foottrack log recover`", offset)
+            raise RecordingError(path, f"a record of kind {opcode} and {length} bytes: torn or damaged", offset)
         record = Record(offset, opcode, stream.read(length))
         if offset == len(magic):
             demanding = _begins_ours(record, path)

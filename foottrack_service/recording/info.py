@@ -61,6 +61,20 @@ class RecordingInfo:
         return 0.0 if self.first is None or self.last is None else (self.last - self.first) * 1e-9
 
 
+class SequenceGaps:
+    """Counts missing messages by ``seq``; a new run of a publisher (``sid``) starts anew."""
+
+    def __init__(self) -> None:
+        self._expected: dict[tuple[str, str, str, str], int] = {}
+
+    def missing_before(self, message: Message) -> int:
+        """How many are missing between the last message of the same source and topic and this one."""
+        key = (message.user, message.stream, message.src, message.sid)
+        expected = self._expected.get(key, message.seq)
+        self._expected[key] = max(message.seq + 1, expected)
+        return max(message.seq - expected, 0)
+
+
 def summarise(recording: Recording) -> RecordingInfo:
     """Read all of a recording. Raises RecordingError where it is damaged."""
     info = RecordingInfo(str(recording.path), recording.format, recording.path.stat().st_size)
@@ -71,7 +85,7 @@ def summarise(recording: Recording) -> RecordingInfo:
 
 def fold(info: RecordingInfo, frames: Iterable[Frame]) -> None:
     """Add frames, in order of arrival, to ``info``."""
-    expected: dict[tuple[bytes, str, str], int] = {}
+    gaps = SequenceGaps()
     topics: dict[bytes, TopicInfo] = {}
     anchors: list[int] = []
     for frame in frames:
@@ -84,9 +98,7 @@ def fold(info: RecordingInfo, frames: Iterable[Frame]) -> None:
         except DecodeError as error:
             entry.undecodable[error.reason] = entry.undecodable.get(error.reason, 0) + 1
             continue
-        key = (frame.topic, message.src, message.sid)
-        entry.lost += max(message.seq - expected.get(key, message.seq), 0)
-        expected[key] = max(message.seq + 1, expected.get(key, 0))
+        entry.lost += gaps.missing_before(message)
         entry.invalid += not message.valid
         if message.src not in entry.sources:
             entry.sources.append(message.src)

@@ -34,11 +34,16 @@ class McapRecording(Recording):
 
     def frames(self, since: int | None = None) -> Iterator[Frame]:
         """Frames in file order, which is the order of arrival."""
-        topics: Topics = {}
+        # Chunks before ``since`` are stepped over where the summary says what they would have announced.
+        topics = {} if since is None else dict(self._summary_topics)
+        skipping = bool(topics)
         earliest = 0 if since is None else since
         for record in self._records():
             if record.opcode == Opcode.CHUNK:
-                data = container.decompress(container.chunk(record, self.path), self.path, record.offset)
+                packed = container.chunk(record, self.path)
+                if skipping and packed.end < earliest:
+                    continue
+                data = container.decompress(packed, self.path, record.offset)
                 for inner in container.chunk_records(data, self.path, record.offset):
                     if inner.opcode == Opcode.MESSAGE:
                         frame = self._frame(inner, topics)
@@ -64,6 +69,20 @@ class McapRecording(Recording):
                 first = packed.start if first is None else min(first, packed.start)
                 last = packed.end if last is None else max(last, packed.end)
         return None if first is None or last is None else Span(first, last)
+
+    def topics(self) -> frozenset[bytes]:
+        """Topics, by the summary where there is one."""
+        if self._summary_topics:
+            return frozenset(topic for topic in self._summary_topics.values() if topic is not None)
+        return super().topics()
+
+    @cached_property
+    def _summary_topics(self) -> Topics:
+        topics: Topics = {}
+        for record in self._records():
+            if record.opcode == Opcode.CHANNEL:
+                self._announce(record, topics)
+        return topics
 
     def _records(self) -> Iterator[container.Record]:
         with self.path.open("rb") as stream:

@@ -65,6 +65,10 @@ class Recording(ABC):
     def span(self) -> Span | None:
         """From when to when; None when it is empty."""
 
+    def topics(self) -> frozenset[bytes]:
+        """Topics that occur."""
+        return frozenset(frame.topic for frame in self.frames())
+
     def messages(self, since: int | None = None) -> Iterator[Recorded]:
         """Messages in order of arrival; streams that this version does not know are left out.
 
