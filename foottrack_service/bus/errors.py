@@ -17,15 +17,15 @@ class BusError(Exception):
     """Base of all errors of this package."""
 
 
-class BindRefused(BusError):  # noqa: N818
+class BindRefused(BusError):
     """Binding there would open the bus to the network."""
 
 
-class BindFailed(BusError):  # noqa: N818
+class BindFailed(BusError):
     """The endpoint cannot be bound."""
 
 
-class NotReady(BusError):  # noqa: N818
+class NotReady(BusError):
     """The bus was not there within the time given."""
 
 
@@ -38,7 +38,7 @@ class ControlError(BusError):
         self.message = message
 
 
-class ControlTimeout(ControlError):  # noqa: N818
+class ControlTimeout(ControlError):
     """Nobody answered."""
 
     def __init__(self, message: str) -> None:

@@ -23,6 +23,7 @@ from foottrack_service.bus.watch import ReadWatch
 BATCH = 64
 """Messages taken from the socket before the event loop gets its turn: below 1 ms of decoding."""
 
+_NOBLOCK = int(zmq.NOBLOCK)
 _LOG_PERIOD_NS = 1_000_000_000
 _log = logging.getLogger(__name__)
 
@@ -83,7 +84,7 @@ class Subscriber:
         """What is there now, without waiting; at most ``limit`` messages leave the socket."""
         received, self._early = self._early, []
         self._receive(received, limit)
-        return list(_newest(received).values()) if self.policy is Policy.LATEST else received
+        return _newest(received) if self.policy is Policy.LATEST else received
 
     async def batches(self) -> AsyncIterator[list[Received]]:
         """What came since the last batch, never empty; gives the event loop its turn between batches.
@@ -95,15 +96,13 @@ class Subscriber:
             batch, self._early = self._early, []
             taken = self._receive(batch, BATCH)
             if self.policy is Policy.LATEST:
-                newest = _newest(batch)
                 total = taken
                 while taken == BATCH and total < HWM:
                     await asyncio.sleep(0)
-                    batch = []
+                    batch = _newest(batch)
                     taken = self._receive(batch, BATCH)
-                    newest |= _newest(batch)
                     total += taken
-                batch = list(newest.values())
+                batch = _newest(batch)
             if batch:
                 yield batch
             await self._watch.readable()
@@ -128,8 +127,11 @@ class Subscriber:
     def _receive(self, into: list[Received], limit: int) -> int:
         """Read up to ``limit`` messages, append what can be decoded, and say how many were read."""
         taken = 0
-        while taken < limit and self._watch.has_input:
-            frames = self._socket.recv_multipart(zmq.NOBLOCK)
+        while taken < limit:
+            try:
+                frames = _read(self._socket)
+            except zmq.Again:
+                break
             taken += 1
             if len(frames) == 1 and frames[0].startswith(WELCOME):
                 self._welcomed(frames[0])
@@ -159,12 +161,26 @@ class Subscriber:
             _log.warning("refused a message: %s", error)
 
 
-def _newest(received: Iterable[Received]) -> dict[bytes, Received]:
+def _read(socket: Socket) -> list[bytes]:
+    """One message, as ``recv_multipart`` at half its cost: a frame knows whether more follow, a socket must be asked.
+
+    Raises zmq.Again when there is none.
+    """
+    frame = socket.recv(_NOBLOCK, copy=False)
+    frames = [frame.bytes]
+    while frame.more:
+        frame = socket.recv(_NOBLOCK, copy=False)
+        frames.append(frame.bytes)
+    return frames
+
+
+def _newest(received: Iterable[Received]) -> list[Received]:
     newest: dict[bytes, Received] = {}
     for item in received:
-        newest.pop(item.raw[0], None)
-        newest[item.raw[0]] = item
-    return newest
+        topic = item.raw[0]
+        newest.pop(topic, None)
+        newest[topic] = item
+    return list(newest.values())
 
 
 def _socket(context: Context, endpoint: str, topics: Iterable[str]) -> Socket:

@@ -12,20 +12,24 @@ import zmq
 
 from foottrack_service.bus.endpoints import Socket
 
+# As ints: arithmetic with pyzmq's enums costs as much as the question itself.
+_EVENTS = int(zmq.EVENTS)
+_POLLIN = int(zmq.POLLIN)
+
 
 class ReadWatch:
     """Wakes coroutines of one event loop when a socket has something to read."""
 
     def __init__(self, socket: Socket) -> None:
         self._socket = socket
-        self._fd = socket.getsockopt(zmq.FD)
+        self._fd: int = socket.fileno()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._waiters: set[asyncio.Future[None]] = set()
 
     @property
     def has_input(self) -> bool:
         """Whether there is something to read now."""
-        return not self._socket.closed and bool(self._socket.getsockopt(zmq.EVENTS) & zmq.POLLIN)  # type: ignore[operator]
+        return not self._socket.closed and int(self._socket.get(_EVENTS)) & _POLLIN != 0
 
     async def readable(self) -> None:
         """Wait for something to read, or for ``close``. Always gives the event loop a turn."""
