@@ -3,7 +3,8 @@
 from foottrack_service.bus.broker import Broker
 from foottrack_service.bus.clock import BusClock, ManualClock, now
 from foottrack_service.bus.connection import Bus
-from foottrack_service.bus.control import ControlClient, ControlServer
+from foottrack_service.bus.control import ControlServer
+from foottrack_service.bus.control_client import ControlClient
 from foottrack_service.bus.errors import (
     BindFailed,
     BindRefused,

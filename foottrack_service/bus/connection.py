@@ -6,13 +6,16 @@ from collections.abc import Iterable
 from types import TracebackType
 from typing import Self
 
+import zmq
+
 from foottrack_protocol.topics import Policy
 from foottrack_service.bus.clock import BusClock, now
-from foottrack_service.bus.control import ControlClient
+from foottrack_service.bus.control_client import ControlClient
 from foottrack_service.bus.endpoints import Context
 from foottrack_service.bus.health import HealthBoard
 from foottrack_service.bus.publisher import Publisher
 from foottrack_service.bus.subscriber import Subscriber
+from foottrack_service.bus.timesync import SyncedClock
 from foottrack_service.config import BusSettings
 
 
@@ -20,7 +23,7 @@ class Bus:
     """Makes publishers and subscribers, and closes them. Belongs to one thread.
 
     Over TCP from any process (``Bus.connect(settings.bus)``), over inproc beside the broker
-    (``Bus.connect(broker.inproc, broker.context)``).
+    (``Bus.connect(broker.inproc, broker.context)``). ``health`` is the board of this process.
     """
 
     def __init__(self, settings: BusSettings, context: Context, own_context: bool, clock: BusClock) -> None:
@@ -28,26 +31,40 @@ class Bus:
         self.context = context
         self.clock = clock
         self.health = HealthBoard()
+        self._own_context = own_context
+        self._made: list[Publisher | Subscriber | ControlClient] = []
 
     @classmethod
     def connect(cls, settings: BusSettings, context: Context | None = None, clock: BusClock = now) -> Self:
-        """Never waits: what it makes has ``ready``."""
-        raise NotImplementedError
+        """Never waits: what it makes has ``ready``. A ``SyncedClock`` that is not fresh makes messages invalid."""
+        return cls(settings, context or zmq.Context(), context is None, clock)
 
     def publisher(self, src: str) -> Publisher:
         """A source of messages called ``src``."""
-        raise NotImplementedError
+        healthy = self.clock.fresh if isinstance(self.clock, SyncedClock) else None
+        publisher = Publisher(self.context, self.settings.ingress, src, self.clock, healthy)
+        self._made.append(publisher)
+        return publisher
 
     def subscriber(self, topics: Iterable[str] = ("",), policy: Policy = Policy.EVERY) -> Subscriber:
         """Messages whose topic begins with one of ``topics``."""
-        raise NotImplementedError
+        subscriber = Subscriber(self.context, self.settings.egress, topics, policy, self.clock)
+        self._made.append(subscriber)
+        return subscriber
 
     def control(self) -> ControlClient:
         """Requests to the service."""
-        raise NotImplementedError
+        client = ControlClient(self.context, self.settings.control)
+        self._made.append(client)
+        return client
 
     def close(self) -> None:
         """Close all that was made here, and the context if it is our own."""
+        for made in self._made:
+            made.close()
+        self._made.clear()
+        if self._own_context:
+            self.context.term()
 
     def __enter__(self) -> Self:
         return self

@@ -1,18 +1,35 @@
-"""Control: requests ``{cmd, args}``, answers ``{ok, result}`` or ``{ok: false, error: {code, message}}``."""
+"""Control, the service's side: ``{cmd, args}`` in, ``{ok, result}`` or ``{ok, error: {code, message}}`` out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import asyncio
+import inspect
+import logging
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
+import zmq
+from pydantic import ConfigDict, ValidationError, validate_call
+
+from foottrack_protocol.envelope import pack_map, unpack_map
+from foottrack_protocol.errors import DecodeError, EncodeError
+from foottrack_protocol.messages import Health, Session
 from foottrack_service.bus.clock import BusClock, now
-from foottrack_service.bus.endpoints import Context
+from foottrack_service.bus.endpoints import HWM, MAX_FRAME_BYTES, Context, bind
+from foottrack_service.bus.errors import BusError, ControlError
 from foottrack_service.bus.health import HealthBoard
 from foottrack_service.bus.session import SessionInfo
+from foottrack_service.bus.watch import SocketWatch
 
 Handler = Callable[..., Any]
 """A function or coroutine function with typed keyword arguments: they are the request's ``args``, checked by type
 (pydantic, strict). It gives what msgpack can carry, or a body. ControlError is answered as it is raised."""
+
+MAX_WAITING = 64
+"""Requests whose handlers wait at the same time; more are answered "busy"."""
+_BATCH = 64
+_STRICT = ConfigDict(strict=True)
+_log = logging.getLogger(__name__)
 
 
 class ControlServer:
@@ -32,24 +49,124 @@ class ControlServer:
         board: HealthBoard | None = None,
         clock: BusClock = now,
     ) -> None:
-        """Bind. Raises BindRefused, BindFailed."""
-        self.endpoint = endpoint
+        """Bind; ``endpoint`` then is the actual one. Raises BindRefused, BindFailed."""
+        session, board = session or SessionInfo(clock=clock), board or HealthBoard()
+
+        def hello() -> Session:
+            return session.body()
+
+        def status() -> Health:
+            return board.body()
+
+        def time() -> dict[str, int]:
+            return {"t": clock()}
+
+        known = {"hello": hello, "status": status, "time": time, **handlers}
+        self._handlers = {name: validate_call(config=_STRICT)(handler) for name, handler in known.items()}
+        self._waiting = 0
+        self._socket = context.socket(zmq.ROUTER)
+        self._socket.set_hwm(HWM)
+        self._socket.setsockopt(zmq.LINGER, 0)
+        self._socket.setsockopt(zmq.MAXMSGSIZE, MAX_FRAME_BYTES)
+        try:
+            self.endpoint = bind(self._socket, endpoint)
+        except BusError:
+            self._socket.close(0)
+            raise
+        self._watch = SocketWatch(self._socket)
 
     async def run(self) -> None:
-        """Answer until cancelled. Handlers that wait do not hold up others."""
+        """Answer until cancelled or closed. Handlers that wait do not hold up others."""
+        async with asyncio.TaskGroup() as tasks:
+            while not self._socket.closed:
+                for _ in range(_BATCH):
+                    try:
+                        frames = self._socket.recv_multipart(zmq.NOBLOCK)
+                    except zmq.Again:
+                        break
+                    self._take(frames, tasks)
+                await self._watch.readable()
 
     def close(self) -> None:
-        """Close the socket."""
+        """Close the socket; ``run`` ends when its handlers have."""
+        if not self._socket.closed:
+            self._watch.close()
+            self._socket.close(0)
+
+    def _take(self, frames: list[bytes], tasks: asyncio.TaskGroup) -> None:
+        # REQ puts an empty frame before its payload, DEALER may put anything: it goes back as it came.
+        address, payload = frames[:-1], frames[-1]
+        answer = self._call(payload)
+        if inspect.isawaitable(answer):
+            tasks.create_task(self._finish(address, answer))
+        else:
+            self._answer(address, answer)
+
+    def _call(self, payload: bytes) -> dict[str, Any] | Awaitable[dict[str, Any]]:
+        try:
+            cmd, args = _request(payload)
+            handler = self._handlers.get(cmd)
+            if handler is None:
+                known = ", ".join(sorted(self._handlers))
+                raise ControlError("unknown_command", f"no command is called {cmd[:100]!r}; there are: {known}")
+            if self._waiting >= MAX_WAITING:
+                raise ControlError("busy", f"{self._waiting} requests wait already")
+            result = handler(**args)
+        except ValidationError as error:
+            return _failure("bad_arguments", "; ".join(_detail(item) for item in error.errors()))
+        except Exception as error:  # whatever a handler does, the client gets an answer
+            return _explained(error)
+        if inspect.isawaitable(result):
+            self._waiting += 1
+            return self._result(result)
+        return {"ok": True, "result": result}
+
+    async def _result(self, awaitable: Awaitable[Any]) -> dict[str, Any]:
+        try:
+            return {"ok": True, "result": await awaitable}
+        except Exception as error:  # as above
+            return _explained(error)
+        finally:
+            self._waiting -= 1
+
+    async def _finish(self, address: list[bytes], answer: Awaitable[dict[str, Any]]) -> None:
+        self._answer(address, await answer)
+
+    def _answer(self, address: list[bytes], answer: dict[str, Any]) -> None:
+        try:
+            payload = pack_map(answer)
+        except EncodeError as error:
+            payload = pack_map(_explained(error))
+        if not self._socket.closed:
+            self._socket.send_multipart([*address, payload], zmq.NOBLOCK)
 
 
-class ControlClient:
-    """Asks the service. Belongs to one event loop."""
+def _request(payload: bytes) -> tuple[str, dict[str, Any]]:
+    try:
+        request = unpack_map(payload)
+    except DecodeError as error:
+        raise ControlError("bad_request", error.detail) from None
+    cmd, args = request.get("cmd"), request.get("args")
+    if not isinstance(cmd, str):
+        raise ControlError("bad_request", "cmd must be a string")
+    if args is None:
+        return cmd, {}
+    if not isinstance(args, dict) or not all(isinstance(key, str) for key in args):
+        raise ControlError("bad_request", "args must be a map with strings as keys")
+    return cmd, args
 
-    def __init__(self, context: Context, endpoint: str) -> None:
-        self.endpoint = endpoint
 
-    async def request(self, cmd: str, args: Mapping[str, Any] | None = None, timeout_s: float = 2.0) -> Any:
-        """The result. Raises ControlError (its answer), ControlTimeout (none), EncodeError."""
+def _explained(error: Exception) -> dict[str, Any]:
+    if isinstance(error, ControlError):
+        return _failure(error.code, error.message)
+    _log.error("a control request failed", exc_info=error)
+    return _failure("internal", f"{type(error).__name__}: {error}")
 
-    def close(self) -> None:
-        """Close; requests that wait end with ControlTimeout."""
+
+def _failure(code: str, message: str) -> dict[str, Any]:
+    return {"ok": False, "error": {"code": code, "message": message}}
+
+
+def _detail(item: Any) -> str:
+    place = ".".join(str(part) for part in item["loc"])
+    return f"{place}: {item['msg']}"

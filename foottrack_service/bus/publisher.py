@@ -16,7 +16,7 @@ from foottrack_service.bus.broker import SUBSCRIBE_ALL, UNSUBSCRIBE_ALL
 from foottrack_service.bus.clock import BusClock, now
 from foottrack_service.bus.endpoints import HWM, Context, Socket
 from foottrack_service.bus.errors import NotReady
-from foottrack_service.bus.watch import ReadWatch
+from foottrack_service.bus.watch import SocketWatch
 
 NO_BUS = "no_bus"
 FULL = "full"
@@ -53,7 +53,7 @@ class Publisher:
         self._seq: dict[tuple[str, str], int] = {}
         self._live = False
         self._socket = _socket(context, endpoint)
-        self._watch = ReadWatch(self._socket)
+        self._watch = SocketWatch(self._socket)
 
     @property
     def live(self) -> bool:

@@ -18,7 +18,7 @@ from foottrack_service.bus.clock import BusClock, now
 from foottrack_service.bus.endpoints import HWM, MAX_FRAME_BYTES, Context, Socket
 from foottrack_service.bus.errors import NotReady
 from foottrack_service.bus.sequence import Stats
-from foottrack_service.bus.watch import ReadWatch
+from foottrack_service.bus.watch import SocketWatch
 
 BATCH = 64
 """Messages taken from the socket before the event loop gets its turn: below 1 ms of decoding."""
@@ -61,7 +61,7 @@ class Subscriber:
         self._early: list[Received] = []
         self._last_log: int | None = None
         self._socket = _socket(context, endpoint, topics)
-        self._watch = ReadWatch(self._socket)
+        self._watch = SocketWatch(self._socket)
 
     async def ready(self, timeout_s: float = 5.0) -> None:
         """Wait until the bus knows the subscription: nothing published after that is missed. Raises NotReady."""
@@ -79,6 +79,11 @@ class Subscriber:
             left_ms = int((deadline - time.monotonic()) * 1000)
             if left_ms <= 0 or not self._socket.poll(left_ms):
                 raise NotReady(f"no bus answers at {self._endpoint}: is the service running?")
+
+    @property
+    def pending(self) -> bool:
+        """Whether something waits to be read."""
+        return bool(self._early) or self._watch.has_input
 
     def drain(self, limit: int = BATCH) -> list[Received]:
         """What is there now, without waiting; at most ``limit`` messages leave the socket."""

@@ -1,4 +1,4 @@
-"""Waiting on a ZeroMQ socket through its file descriptor, in any loop that has ``add_reader``.
+"""Waiting on a ZeroMQ socket through its file descriptor, in any event loop that has ``add_reader``.
 
 The descriptor is edge-triggered: it says that something happened, never what, and reading, sending or asking for the
 socket's events takes the word back. So the events are asked after arming, after each word, and before each wait.
@@ -15,51 +15,61 @@ from foottrack_service.bus.endpoints import Socket
 # As ints: arithmetic with pyzmq's enums costs as much as the question itself.
 _EVENTS = int(zmq.EVENTS)
 _POLLIN = int(zmq.POLLIN)
+_POLLOUT = int(zmq.POLLOUT)
 
 
-class ReadWatch:
-    """Wakes coroutines of one event loop when a socket has something to read."""
+class SocketWatch:
+    """Wakes coroutines of one event loop when a socket can be read or written."""
 
     def __init__(self, socket: Socket) -> None:
         self._socket = socket
         self._fd: int = socket.fileno()
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._waiters: set[asyncio.Future[None]] = set()
+        self._waiters: dict[asyncio.Future[None], int] = {}
 
     @property
     def has_input(self) -> bool:
         """Whether there is something to read now."""
-        return not self._socket.closed and int(self._socket.get(_EVENTS)) & _POLLIN != 0
+        return self._events() & _POLLIN != 0
 
     async def readable(self) -> None:
         """Wait for something to read, or for ``close``. Always gives the event loop a turn."""
-        loop = asyncio.get_running_loop()
-        if self._loop is not loop:
-            self._disarm()
-            loop.add_reader(self._fd, self._on_word)
-            self._loop = loop
-        if self.has_input or self._socket.closed:
-            await asyncio.sleep(0)
-            return
-        waiter = loop.create_future()
-        self._waiters.add(waiter)
-        try:
-            await waiter
-        finally:
-            self._waiters.discard(waiter)
+        await self._wait(_POLLIN)
+
+    async def writable(self) -> None:
+        """Wait until the socket takes a message, or for ``close``. Always gives the event loop a turn."""
+        await self._wait(_POLLOUT)
 
     def close(self) -> None:
         """Stop watching and wake all who wait; to be called before the socket is closed."""
         self._disarm()
-        self._wake()
+        self._wake(_POLLIN | _POLLOUT)
+
+    def _events(self) -> int:
+        return 0 if self._socket.closed else int(self._socket.get(_EVENTS))
+
+    async def _wait(self, wanted: int) -> None:
+        loop = asyncio.get_running_loop()
+        if self._loop is not loop and not self._socket.closed:
+            self._disarm()
+            loop.add_reader(self._fd, self._on_word)
+            self._loop = loop
+        if self._events() & wanted or self._socket.closed:
+            await asyncio.sleep(0)
+            return
+        waiter = loop.create_future()
+        self._waiters[waiter] = wanted
+        try:
+            await waiter
+        finally:
+            del self._waiters[waiter]
 
     def _on_word(self) -> None:
-        if self.has_input:
-            self._wake()
+        self._wake(self._events())
 
-    def _wake(self) -> None:
-        for waiter in self._waiters:
-            if not waiter.done():
+    def _wake(self, events: int) -> None:
+        for waiter, wanted in self._waiters.items():
+            if events & wanted and not waiter.done():
                 waiter.set_result(None)
 
     def _disarm(self) -> None:
