@@ -24,6 +24,8 @@ GRID_HZ = 500.0
 MARGIN_S = 0.5
 """Tracks reach so far beyond both ends, for sensors that look a little before the start."""
 
+BOTH: tuple[Side, Side] = ("left", "right")
+
 Flags = npt.NDArray[np.bool_]
 
 
