@@ -9,7 +9,6 @@ from foottrack_protocol.frames import STANDARD_GRAVITY
 from foottrack_service.imu.formats import raw, rvc
 from foottrack_service.imu.sample import DeviceSample, Quat, gravity_in_device
 
-
 _POLE = 1.0 - 1e-9
 
 

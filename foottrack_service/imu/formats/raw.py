@@ -65,8 +65,10 @@ class RawDecoder(Decoder):
         acc, gyro = (ax, ay, az), (gx, gy, gz)
         if not (all(abs(a) <= MAX_ACC for a in acc) and all(abs(g) <= MAX_GYRO for g in gyro)):
             return "range"
-        if self._sequence is not None:
-            self.drops["lost"] += (sequence - self._sequence - 1) % 256
+        missing = 0 if self._sequence is None else (sequence - self._sequence - 1) % 256
+        # A count that goes back is that of a device that started anew.
+        if 0 < missing < 128:
+            self.drops["lost"] += missing
         self._sequence = sequence
         return DeviceSample(micros, acc, gyro)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections import Counter
+from collections.abc import Iterator
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -49,16 +50,14 @@ class ShtpReceiver:
         self._splitter = Splitter(FLAG, _LONGEST, drops)
         self._sequence: dict[Channel, int] = {}
 
-    def feed(self, data: bytes) -> list[Cargo]:
-        """The cargoes that are whole with these bytes."""
-        cargoes = []
+    def feed(self, data: bytes) -> Iterator[Cargo]:
+        """The cargoes that are whole with these bytes, one at a time: the reader may ``restart`` in between."""
         for frame in self._splitter.feed(data):
             cargo = self._parse(frame)
             if isinstance(cargo, str):
                 self._drops[cargo] += 1
             elif cargo is not None:
-                cargoes.append(cargo)
-        return cargoes
+                yield cargo
 
     def restart(self) -> None:
         """The device started again: its sequence numbers do too."""
@@ -89,8 +88,10 @@ class ShtpReceiver:
                 return "fragment"
             return "header"
         self._sequence[channel] = sequence
-        if before is not None:
-            self._drops["lost"] += (sequence - before - 1) % 256
+        missing = 0 if before is None else (sequence - before - 1) % 256
+        # A count that goes back is that of a device that started anew.
+        if 0 < missing < 128:
+            self._drops["lost"] += missing
         return Cargo(channel, sequence, frame[1 + HEADER.size :])
 
 
