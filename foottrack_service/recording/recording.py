@@ -65,6 +65,13 @@ class Recording(ABC):
     def span(self) -> Span | None:
         """From when to when; None when it is empty."""
 
+    def require_span(self) -> Span:
+        """From when to when. Raises RecordingError when it is empty, too."""
+        span = self.span()
+        if span is None:
+            raise RecordingError(self.path, "there is no message in it")
+        return span
+
     def topics(self) -> frozenset[bytes]:
         """Topics that occur."""
         return frozenset(frame.topic for frame in self.frames())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from foottrack_service.recording.recording import Span
 
 SLIP_NS = 500_000_000
-"""A replay that falls further behind than this (a sleeping laptop, a rate beyond the machine) goes on from where it is."""
+"""Further behind than this (a laptop slept, the machine is too slow for the rate) a replay goes on from where it is."""
 MIN_RATE, MAX_RATE = 0.01, 100.0
 
 

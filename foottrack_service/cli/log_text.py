@@ -1,0 +1,70 @@
+"""What ``foottrack log`` shows to a person."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from foottrack_service.recording.compare import Comparison
+from foottrack_service.recording.info import RecordingInfo
+from foottrack_service.recording.recover import Recovered
+
+_MOST_FIELDS = 20
+
+
+def show_info(found: RecordingInfo) -> None:
+    """A line on the whole, a table of topics, and the calibration."""
+    console = Console()
+    begun = ""
+    if found.begun_unix_ns is not None:
+        moment = datetime.datetime.fromtimestamp(found.begun_unix_ns * 1e-9, datetime.UTC).astimezone()
+        begun = f", begun {moment:%Y-%m-%d %H:%M:%S}"
+    settings = "carries its settings" if found.has_config else "carries no settings"
+    each = f" ({found.file_bytes / found.messages:.0f} bytes a message)" if found.messages else ""
+    console.print(f"{found.path}: {found.format}, {found.file_bytes / 1e6:.2f} MB{each}{begun}, {settings}")
+    console.print(f"{found.messages} messages in {found.duration_s:.1f} s")
+    table = Table("topic", "messages", "Hz", "lost", "invalid", "longest gap", "from")
+    for name, entry in sorted(found.topics.items()):
+        hz = "" if entry.hz is None else f"{entry.hz:.1f}"
+        bad = entry.invalid + sum(entry.undecodable.values())
+        reasons = "".join(f" {reason} {count}" for reason, count in entry.undecodable.items())
+        gap = f"{entry.longest_gap_s * 1e3:.1f} ms"
+        table.add_row(name, str(entry.messages), hz, str(entry.lost), f"{bad}{reasons}", gap, ", ".join(entry.sources))
+    console.print(table)
+    for name, values in sorted(found.calibration.items()):
+        console.print(f"calibration {name}: {values}")
+
+
+def show_comparison(found: Comparison) -> None:
+    """The first divergence, and how much each field moved."""
+    if found.first is None:
+        typer.echo(f"The same: {found.compared} messages.")
+        return
+    typer.echo(f"First difference: {found.first}")
+    typer.echo(f"{found.compared} messages compared, {found.only_a} only in A, {found.only_b} only in B")
+    worst = sorted(found.moved.items(), key=lambda item: -item[1].messages)
+    for name, moves in worst[:_MOST_FIELDS]:
+        typer.echo(f"  {name}: {moves.messages} messages, by at most {moves.largest:.6g}")
+    if len(worst) > _MOST_FIELDS:
+        typer.echo(f"  and {len(worst) - _MOST_FIELDS} fields more")
+
+
+def show_recovered(report: Recovered, out: Path) -> None:
+    """What was salvaged, and what was lost."""
+    for offset, detail in report.damage:
+        typer.echo(f"byte {offset}: {detail}" if offset is not None else detail)
+    if not report.messages:
+        typer.echo("Nothing could be recovered.")
+        return
+    assert report.first is not None and report.last is not None
+    settings = "" if report.has_config else ", without settings"
+    typer.echo(f"{report.messages} messages, {(report.last - report.first) * 1e-9:.1f} s, in {out}{settings}")
+    if report.whole:
+        typer.echo("The recording was whole.")
+        return
+    lost = "unknown (what came after the last flush)" if report.lost_messages is None else str(report.lost_messages)
+    typer.echo(f"Lost: messages {lost}; {report.lost_bytes} bytes of the file; {report.gaps} messages missing by seq")

@@ -1,0 +1,112 @@
+"""The recorder on a live bus."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import StringConstraints
+
+from foottrack_protocol.topics import split_topic
+from foottrack_service.bus.connection import Bus
+from foottrack_service.bus.errors import ControlError
+from foottrack_service.config import Settings, to_toml
+from foottrack_service.recording.errors import DiskFullError, RecordingError
+from foottrack_service.recording.writer import RecordingWriter, WriterStats
+
+SUFFIX = ".mcap"
+RecordingName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,100}$")]
+
+
+async def run(
+    bus: Bus, settings: Settings, path: Path, *, on_started: Callable[[RecordingWriter], None] | None = None
+) -> WriterStats:
+    """Record all users' streams, as far as the registry says so, until cancelled: then the file is closed properly.
+
+    ``on_started`` is called when nothing published from then on is missed. Raises RecordingError when the file cannot
+    be made or the recording ends by itself: a DiskFullError leaves a whole file.
+    """
+    subscriber = bus.subscriber()
+    recorded: dict[bytes, bool] = {}
+    try:
+        await subscriber.ready()
+        writer = RecordingWriter(path, to_toml(settings), bus.clock)
+        try:
+            if on_started is not None:
+                on_started(writer)
+            async for batch in subscriber.batches():
+                for message, arrival, (topic, payload) in batch:
+                    wanted = recorded.get(topic)
+                    if wanted is None:
+                        wanted = recorded[topic] = split_topic(message.topic)[1].recorded
+                    if wanted:
+                        writer.write(topic, payload, arrival, message.t_pub, message.seq)
+                if writer.error is not None:
+                    raise writer.error
+        finally:
+            await asyncio.shield(asyncio.to_thread(writer.close))
+        return writer.stats
+    finally:
+        subscriber.close()
+
+
+class Recorder:
+    """Recordings on request, one at a time, into one folder and nowhere else."""
+
+    def __init__(self, bus: Bus, settings: Settings, folder: Path) -> None:
+        self._bus = bus
+        self._settings = settings
+        self._folder = folder
+        self._writer: RecordingWriter | None = None
+        self._task: asyncio.Task[WriterStats] | None = None
+
+    @property
+    def handlers(self) -> dict[str, Callable[..., Any]]:
+        """For the control socket: ``record/start {name}`` and ``record/stop``."""
+        return {"record/start": self.start, "record/stop": self.stop}
+
+    async def start(self, name: RecordingName) -> dict[str, Any]:
+        """Begin ``<name>.mcap``. Raises ControlError: one runs already, or the file cannot be made."""
+        if self._task is not None and not self._task.done():
+            raise ControlError("busy", "a recording is running already")
+        self._folder.mkdir(parents=True, exist_ok=True)
+        started: asyncio.Future[RecordingWriter] = asyncio.get_running_loop().create_future()
+        path = self._folder / (name + SUFFIX)
+        self._writer = None
+        self._task = asyncio.create_task(
+            run(self._bus, self._settings, path, on_started=started.set_result), name="recorder"
+        )
+        waiting: set[asyncio.Future[Any]] = {self._task, started}
+        await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+        if not started.done():
+            try:
+                await self._task
+            except RecordingError as error:
+                raise ControlError("failed", str(error)) from None
+        self._writer = started.result()
+        return {"name": name}
+
+    async def stop(self) -> dict[str, Any]:
+        """End the recording, and say what is in it. Raises ControlError: none runs, or it had ended badly."""
+        task, writer = self._task, self._writer
+        if task is None or writer is None:
+            raise ControlError("not_recording", "nothing is being recorded")
+        self._task = None
+        task.cancel()
+        try:
+            await task
+        except asyncio.CancelledError:
+            pass
+        except DiskFullError:
+            pass  # the answer says so
+        except RecordingError as error:
+            raise ControlError("failed", str(error)) from None
+        stats = writer.stats
+        return {
+            "name": writer.path.name.removesuffix(SUFFIX),
+            "messages": stats.written,
+            "dropped": stats.dropped,
+            "error": str(writer.error) if writer.error is not None else None,
+        }
