@@ -10,11 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from foottrack_service.camera.rendering.noise import NoiseBank
-from foottrack_service.camera.rendering.scene import Shoe
 from foottrack_service.camera.rig import Intrinsics
 from foottrack_service.rotations import Array
 
 Field = npt.NDArray[np.float32]
+Faces = Sequence[tuple[int, ...]]
+SHEET_FACES: Faces = ((3, 2, 1, 0),)
 
 
 @dataclass(frozen=True)
@@ -61,30 +62,26 @@ class DepthModel:
         return np.asarray(ahead > shifted + 0.5)
 
 
+Surface = tuple[Array, Faces, Array, Array]
+"""Vertices (n, 3) and outward faces of a convex body, its place (3,) and rotation (3, 3) in the stage."""
+
+
 def draw_depth(
-    shoes: Sequence[tuple[Shoe, Array, Array]],
-    camera: tuple[Array, Array],
-    floor_height: float,
-    intrinsics: Intrinsics,
+    surfaces: Sequence[Surface], camera: tuple[Array, Array], floor_height: float, intrinsics: Intrinsics
 ) -> Field:
-    """True inverse depth (h, w), 1/m, 0 at infinity, of shoes at (place, rotation) in the stage, from a camera."""
+    """True inverse depth (h, w), 1/m, 0 at infinity, from a camera at (place, rotation) in the stage."""
     place, R = camera
     size = (intrinsics.height, intrinsics.width)
     to_rays: Array = np.asarray(np.linalg.inv(intrinsics.matrix), dtype=np.float64)
     inverse = np.maximum(_plane((R @ to_rays)[1] / (floor_height - place[1]), 0, 0, size), 0.0)
-    for shoe, p, R_foot in shoes:
-        bodies = [(solid.vertices, solid.faces) for solid in shoe.solids]
-        bodies += [(sheet.corners, ((3, 2, 1, 0),)) for sheet in shoe.sheets]
-        for vertices, faces in bodies:
-            cv = (p + vertices @ R_foot.T - place) @ R
-            if cv[:, 2].min() > 0.05:
-                _draw_body(inverse, cv, faces, intrinsics, to_rays)
+    for vertices, faces, p, R_body in surfaces:
+        cv = (p + vertices @ R_body.T - place) @ R
+        if cv[:, 2].min() > 0.05:
+            _draw_body(inverse, cv, faces, intrinsics, to_rays)
     return inverse
 
 
-def _draw_body(
-    inverse: Field, cv: Array, faces: Sequence[tuple[int, ...]], intrinsics: Intrinsics, to_rays: Array
-) -> None:
+def _draw_body(inverse: Field, cv: Array, faces: Faces, intrinsics: Intrinsics, to_rays: Array) -> None:
     pixels = intrinsics.project(cv)
     low = np.maximum(np.floor(pixels.min(axis=0)), 0).astype(int)
     high = np.minimum(np.ceil(pixels.max(axis=0)) + 1, inverse.shape[::-1]).astype(int)

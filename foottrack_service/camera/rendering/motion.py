@@ -50,6 +50,11 @@ class Poses:
         p, q = track(times)
         return cls(start, float(times[1] - times[0]), np.asarray(p), rotations.to_matrix(q))
 
+    def one(self, t: float) -> tuple[Array, Array]:
+        """Position (3,) and rotation matrix (3, 3) at one time, s."""
+        p, R = self.at(np.array([t]))
+        return p[0], R[0]
+
     def at(self, t: Array) -> tuple[Array, Array]:
         """Positions (..., 3) and rotation matrices (..., 3, 3) at times (...), s, inside the span."""
         place = np.clip((t - self.start) / self.step, 0.0, _KNOTS - 1 - 1e-9)

@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from foottrack_service.camera.rendering.depth import DepthModel, draw_depth
+from foottrack_service.camera.rendering.depth import SHEET_FACES, DepthModel, Surface, draw_depth
 from foottrack_service.camera.rendering.motion import Poses
 from foottrack_service.camera.rendering.noise import NoiseBank
-from foottrack_service.camera.rendering.scene import FLOOR_TILE_M, Scene, Sheet, Shoe, floor_texture
+from foottrack_service.camera.rendering.scene import FLOOR_TILE_M, Scene, Sheet, Shoe, Solid, floor_texture, shin_of
 from foottrack_service.camera.rig import Rig
 from foottrack_service.rotations import Array
 
@@ -69,19 +69,27 @@ class Renderer:
         half = 0.5 * (self.shutter.exposure + self.shutter.readout)
         head = Poses.sample(self.scene.head, t - half, t + half)
         feet = {side: Poses.sample(track, t - half, t + half) for side, track in self.scene.feet.items()}
+        shins = {
+            side: Poses.sample(shin_of(self.scene.head, track), t - half, t + half)
+            for side, track in self.scene.feet.items()
+        }
         picture = self._draw_floor(head, t)
         shoes = self.scene.shoes
         far_first = sorted(feet, key=lambda side: -self._distance(head, feet[side], t))
         for side in far_first:
-            self._draw_shoe(picture, shoes[side], feet[side], head, t)
+            self._draw_shoe(picture, shoes[side], feet[side], shins[side], head, t)
         if self._picture.psf > 0.0:
             picture = np.asarray(cv2.GaussianBlur(picture, (0, 0), self._picture.psf), dtype=np.uint8)
         picture = self._noise.apply(picture, self._picture.read_noise, self._picture.shot_noise)
         if self._depth is None:
             return picture, None
-        placed = [(shoes[side], *(part[0] for part in feet[side].at(np.array([t])))) for side in far_first]
-        p, R = (part[0] for part in head.at(np.array([t])))
-        depth = draw_depth(placed, self._camera(p, R), self.scene.floor_height, self.rig.intrinsics)
+        surfaces: list[Surface] = []
+        for side in far_first:
+            foot, shin = feet[side].one(t), shins[side].one(t)
+            surfaces += [(solid.vertices, solid.faces, *foot) for solid in (shoes[side].last, shoes[side].upper)]
+            surfaces += [(sheet.corners, SHEET_FACES, *foot) for sheet in shoes[side].sheets]
+            surfaces.append((shoes[side].shin.vertices, shoes[side].shin.faces, *shin))
+        depth = draw_depth(surfaces, self._camera(*head.one(t)), self.scene.floor_height, self.rig.intrinsics)
         return picture, self._depth.spoil(depth, self.rig.intrinsics, self._noise)
 
     def project(self, points: Array, side: str, t: float) -> tuple[Array, Array]:
@@ -97,8 +105,7 @@ class Renderer:
         return p_head + R_head @ np.asarray(self.rig.mount_p), R_head @ self.rig.R_cv
 
     def _distance(self, head: Poses, foot: Poses, t: float) -> float:
-        at = np.array([t])
-        return float(np.linalg.norm(foot.at(at)[0] - head.at(at)[0]))
+        return float(np.linalg.norm(foot.one(t)[0] - head.one(t)[0]))
 
     def _row_times(self, rows: Array, t: float) -> Array:
         height = self.rig.intrinsics.height
@@ -130,7 +137,7 @@ class Renderer:
         motion = intrinsics.focal * np.linalg.norm(turned[1] - turned[0]) / np.sqrt(2.0)
         passes = int(np.clip(np.ceil(motion / 2.0), 1, 4))
         instants = np.linspace(t - half, t + half, 2 * passes + 1)[1::2]
-        drawn = [self._floor_at(*self._camera(*(part[0] for part in head.at(np.array([at]))))) for at in instants]
+        drawn = [self._floor_at(*self._camera(*head.one(at))) for at in instants]
         if passes == 1:
             return drawn[0]
         return np.asarray(np.mean(drawn, axis=0), dtype=np.uint8)
@@ -153,11 +160,19 @@ class Renderer:
             picture[fall <= 0.0] = _SKY
         return np.asarray(picture)
 
-    def _draw_shoe(self, picture: npt.NDArray[np.uint8], shoe: Shoe, foot: Poses, head: Poses, t: float) -> None:
-        points = np.concatenate([s.vertices for s in shoe.solids] + [s.corners for s in shoe.sheets])
+    def _draw_shoe(
+        self, picture: npt.NDArray[np.uint8], shoe: Shoe, foot: Poses, shin: Poses, head: Poses, t: float
+    ) -> None:
+        points = np.concatenate([shoe.last.vertices, *(s.corners for s in shoe.sheets), shoe.upper.vertices])
         half = 0.5 * self.shutter.exposure
-        ends, visible = self._project(points, foot, head, t, np.array([-half, half]))
-        if not visible:
+
+        def project(offsets: Array) -> Array | None:
+            on_foot, foot_visible = self._project(points, foot, head, t, offsets)
+            on_shin, shin_visible = self._project(shoe.shin.vertices, shin, head, t, offsets)
+            return np.concatenate([on_foot, on_shin], axis=1) if foot_visible and shin_visible else None
+
+        ends = project(np.array([-half, half]))
+        if ends is None:
             return
         height, width = picture.shape
         low = np.maximum(np.floor(ends.min(axis=(0, 1))) - 2, 0).astype(int)
@@ -167,7 +182,10 @@ class Renderer:
         blur = np.linalg.norm(ends[1] - ends[0], axis=1).max()
         count = int(np.clip(np.ceil(1.5 * blur), 1, 24))
         instants = np.linspace(-half, half, 2 * count + 1)[1::2]
-        pixels = (self._project(points, foot, head, t, instants)[0] - low + 0.5) * _SUPERSAMPLING - 0.5
+        pixels = project(instants)
+        if pixels is None:
+            return
+        pixels = (pixels - low + 0.5) * _SUPERSAMPLING - 0.5
         roi = picture[low[1] : high[1], low[0] : high[0]]
         size = (roi.shape[1] * _SUPERSAMPLING, roi.shape[0] * _SUPERSAMPLING)
         # NEAREST up and AREA down leave untouched pixels as they were.
@@ -182,20 +200,24 @@ class Renderer:
 
 
 def _draw_instant(canvas: npt.NDArray[np.uint8], shoe: Shoe, pixels: Array) -> None:
-    first, sheets_at = 0, sum(len(solid.vertices) for solid in shoe.solids)
-    for layer, solid in enumerate(shoe.solids):
-        corners = pixels[first : first + len(solid.vertices)]
-        fixed = np.rint(np.clip(corners, -4000.0, 4000.0) * (1 << _SHIFT)).astype(np.int32)
-        for face, grey in zip(solid.faces, solid.grey, strict=True):
-            polygon = list(face)
-            if _turn(corners[polygon]) < 0.0:
-                cv2.fillConvexPoly(canvas, fixed[polygon], grey, cv2.LINE_8, _SHIFT)
-        first += len(solid.vertices)
-        if layer == 0:
-            at = sheets_at
-            for sheet in shoe.sheets:
-                _draw_sheet(canvas, sheet, pixels[at : at + 4])
-                at += 4
+    """`pixels` (n, 2): the vertices of all parts, in the order in which they are drawn."""
+    first = 0
+    parts: tuple[Solid | Sheet, ...] = (shoe.last, *shoe.sheets, shoe.upper, shoe.shin)
+    for part in parts:
+        if isinstance(part, Sheet):
+            _draw_sheet(canvas, part, pixels[first : first + 4])
+            first += 4
+        else:
+            _draw_solid(canvas, part, pixels[first : first + len(part.vertices)])
+            first += len(part.vertices)
+
+
+def _draw_solid(canvas: npt.NDArray[np.uint8], solid: Solid, corners: Array) -> None:
+    fixed = np.rint(np.clip(corners, -4000.0, 4000.0) * (1 << _SHIFT)).astype(np.int32)
+    for face, grey in zip(solid.faces, solid.grey, strict=True):
+        polygon = list(face)
+        if _turn(corners[polygon]) < 0.0:
+            cv2.fillConvexPoly(canvas, fixed[polygon], grey, cv2.LINE_8, _SHIFT)
 
 
 def _draw_sheet(canvas: npt.NDArray[np.uint8], sheet: Sheet, corners: Array) -> None:

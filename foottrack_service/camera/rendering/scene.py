@@ -19,6 +19,8 @@ from foottrack_service.rotations import Array
 FLOOR_TILE_M = 4.0
 _FLOOR_PX = 2048
 _TAG_PX_PER_CELL = 24
+_HEAD_TO_HIP_M = 0.78
+_SHIN_M = 0.43
 PAPER, INK = 205, 32
 """Grey levels of the print."""
 
@@ -42,10 +44,15 @@ class Sheet:
 
 @dataclass(frozen=True)
 class Shoe:
-    """One foot as the camera sees it, drawn from back to front."""
+    """One foot as the camera sees it, drawn in this order: sole and toes, tags, ankle, and the shin that hides them.
 
-    solids: tuple[Solid, ...]
+    All in the foot's frame but the shin, which has its origin at the ankle too and +Y towards the knee.
+    """
+
+    last: Solid
     sheets: tuple[Sheet, ...]
+    upper: Solid
+    shin: Solid
 
 
 @dataclass(frozen=True)
@@ -78,8 +85,33 @@ def make_shoe(
     low, step = -ankle_height, -ankle_height + 0.04
     last = _prism([(0.07, low), (0.07, step), (-0.10, step), (-0.20, low + 0.025), (-0.20, low)], 0.045, 95)
     upper = _prism([(0.07, step), (0.06, 0.03), (-0.03, 0.03), (-0.085, step)], 0.04, 70)
-    leg = _prism([(0.055, 0.03), (0.06, 0.25), (-0.045, 0.25), (-0.03, 0.03)], 0.045, 55)
-    return Shoe((last, upper, leg), tuple(sheets))
+    shin = _prism([(0.045, 0.02), (0.06, 0.28), (-0.05, 0.28), (-0.035, 0.02)], 0.045, 55)
+    return Shoe(last, tuple(sheets), upper, shin)
+
+
+def shin_of(head: PoseTrack, foot: PoseTrack) -> PoseTrack:
+    """Where the shin goes: towards a knee that bends forward as far as the way from ankle to hip demands.
+
+    Hips are 0.78 m straight below the head, shin and thigh 0.43 m.
+    """
+
+    def track(t: Array) -> tuple[Array, Array]:
+        p, q = foot(t)
+        way = head(t)[0] - (0.0, _HEAD_TO_HIP_M, 0.0) - p
+        length = np.linalg.norm(way, axis=-1, keepdims=True)
+        ahead = rotations.rotate(rotations.from_yaw(rotations.yaw_of(q)), (0.0, 0.0, -1.0))
+        along = way / np.maximum(length, 1e-6)
+        side = _unit(np.cross(ahead, along))
+        bend = np.arccos(np.clip(0.5 * length / _SHIN_M, 0.2, 1.0))
+        up = along * np.cos(bend) + np.cross(along, side) * -np.sin(bend)
+        back = np.cross(side, up)
+        return p, rotations.from_matrix(np.stack([side, up, back], axis=-1))
+
+    return track
+
+
+def _unit(v: Array) -> Array:
+    return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9))
 
 
 def floor_texture(seed: int) -> npt.NDArray[np.uint8]:
