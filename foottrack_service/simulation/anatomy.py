@@ -13,7 +13,7 @@ from foottrack_service.rotations import Array
 # Control of Human Movement, fig. 4.1.
 _THIGH, _SHANK, _EYE = 0.245, 0.246, 0.936
 _HIP_SPACING = 0.10  # distance of the hip joints' centres: Winter's hip breadth (0.191) less the flesh outside them
-_STANDING_SHARE = 0.975  # hip to ankle over thigh plus shank at ease: the knees are not locked
+_STANDING_SHARE = 0.993  # hip to ankle over thigh plus shank at ease: the knees bend by some 13 deg
 _HEEL_BEHIND_ANKLE = 0.055  # m, about a quarter of a foot of 0.26 m
 _BALL_SHARE = 0.65  # the metatarsal heads lie at about 0.65 to 0.7 of the way from ankle to toes
 

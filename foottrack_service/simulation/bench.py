@@ -29,6 +29,13 @@ _REACH = 0.25  # m, how far things are moved
 _STILL_S = 3.0  # at the start, so that filters can settle
 
 
+def still(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """Nothing moves."""
+    t = grid(seconds)
+    none = np.zeros((len(t), 3))
+    return _scene(t, seconds, settings, none, none, none, none)
+
+
 def tracker_moving(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
     """Trackers in a hand: left, right, forwards, back, up, down, a circle; headset fixed."""
     t = grid(seconds)

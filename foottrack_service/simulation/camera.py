@@ -77,7 +77,7 @@ def eye(truth: Truth, t: Array, mount: Placement, faults: Sequence[Fault]) -> Ey
 def row_times(
     truth: Truth, middle: Array, point: tuple[Side, Array], mount: Placement, faults: Sequence[Fault]
 ) -> Array:
-    """Mid-exposure (n,), s, of the row on which a foot's point (3,) falls in pictures whose middle row is at `middle`."""
+    """Mid-exposure (n,), s, of the rows on which a foot's point (3,) falls; `middle` (n,) of the middle rows."""
     side, r = point
     t = middle
     for _ in range(2):

@@ -44,7 +44,7 @@ def imu_emission(side: Side, samples: ImuSamples) -> Emission:
     acc, t_dev, t_arr = samples.acc.tolist(), samples.t_dev.tolist(), _ns(samples.t_arr).tolist()
     gyro = None if samples.gyro is None else samples.gyro.tolist()
     q = None if samples.q is None else samples.q.tolist()
-    finite = np.isfinite(samples.acc).all(axis=-1).tolist()
+    finite = np.all(np.isfinite(samples.acc), axis=-1)
 
     def body(i: int, start: int) -> Imu:
         # A NaN is a fault that a validated body cannot hold: this is what a broken producer would send.

@@ -182,7 +182,7 @@ def _turning(ahead: float, height: float, pitch: tuple[float, float, float]) -> 
 
 
 def _in_stage(place: Place, forward_up: Array) -> Array:
-    return _direction(place, forward_up) + np.array([place.x, 0.0, place.z])
+    return np.asarray(_direction(place, forward_up) + np.array([place.x, 0.0, place.z]))
 
 
 def _direction(place: Place, forward_up: Array) -> Array:

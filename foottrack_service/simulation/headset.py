@@ -16,8 +16,8 @@ from foottrack_service.simulation.faults import ClockJump, Fault, HeadsetLost, H
 from foottrack_service.simulation.truth import Flags, Track
 
 HEAD_HZ = 90.0
-# Niehorster, Li and Lappe 2017 (HTC Vive): at rest 0.2 mm and 0.02 deg RMS. A slow wander of 1 mm within a room
-# (static accuracy of millimetres: Bauer et al. 2021) comes on top; their tilted ground plane is the floor calibration's.
+# Niehorster, Li and Lappe 2017 (HTC Vive): at rest below 0.2 mm and 0.02 deg RMS. A slow wander comes on top (Bauer et
+# al. 2021: reproducible within millimetres); the tilted ground plane that both saw is no noise and left out.
 _P_NOISE = 0.2e-3  # m SD, white
 _Q_NOISE = math.radians(0.02)  # rad SD, white
 _P_WANDER, _Q_WANDER, _WANDER_TAU_S = 0.5e-3, math.radians(0.03), 20.0
@@ -71,7 +71,7 @@ def stages(faults: Sequence[Fault]) -> tuple[Array, list[Stage]]:
 
 def measured(head: Track, seconds: float, faults: Sequence[Fault], random: np.random.Generator) -> HeadSamples:
     """A run of `seconds`."""
-    t = (float(random.random()) + np.arange(math.ceil(seconds * HEAD_HZ))) / HEAD_HZ
+    t = np.asarray((float(random.random()) + np.arange(math.ceil(seconds * HEAD_HZ))) / HEAD_HZ, dtype=np.float64)
     t = t[t < seconds]
     n = len(t)
     p, q = head.pose(t)

@@ -73,7 +73,7 @@ FUSED = ImuModel(
 """Fuses on board: sends specific force and its own quaternion, no gyro."""
 
 RAW = ImuModel(
-    # BMI270 data sheet (BST-BMI270-DS000): 160 ug/sqrt(Hz), 0.007 deg/s/sqrt(Hz), zero-g +-20 mg, zero-rate +-0.5 deg/s.
+    # BMI270 data sheet: 160 ug/sqrt(Hz), 0.007 deg/s/sqrt(Hz), zero-g +-20 mg, zero-rate +-0.5 deg/s.
     acc_range=8.0 * STANDARD_GRAVITY,  # of its +-16 g: the setting that most firmwares take
     acc_density=160e-6 * STANDARD_GRAVITY,
     acc_bias_sd=20e-3 * STANDARD_GRAVITY,
@@ -152,7 +152,7 @@ def measured(
     model = FUSED if kind == "fused" else RAW
     skew = _SKEW_SD * float(random.standard_normal())
     period = (1.0 + skew) / hz
-    t = float(random.random()) * period + period * np.arange(math.ceil(seconds / period))
+    t = np.asarray(period * (float(random.random()) + np.arange(math.ceil(seconds / period))), dtype=np.float64)
     t = t[t < seconds]
     n = len(t)
 

@@ -23,7 +23,7 @@ def gauss_markov(random: np.random.Generator, count: int, step: float, tau: floa
 
 def wander(random: np.random.Generator, count: int, rate: float, band_hz: float, sd: Array | float) -> Array:
     """Smooth random motion below `band_hz` with standard deviation `sd` (scalar or (3,)); (count, 3) at `rate` Hz."""
-    # Smooth motion is drawn slowly and only then interpolated: filtering far below the sampling rate is ill-conditioned.
+    # Drawn slowly and then interpolated: filtering far below the sampling rate is ill-conditioned.
     slow = 8.0 * band_hz
     sections = butter(4, band_hz, fs=slow, output="sos")
     length = int(np.ceil(count * slow / rate)) + 64

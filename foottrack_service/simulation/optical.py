@@ -1,4 +1,4 @@
-"""What a camera node would say of these pictures: tags with noise, misses, flips and false finds, and the depth blob."""
+"""What a camera node would say of the pictures: tags with noise, misses, flips and false finds, and the depth blob."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _FLIP_SHARE = 0.12  # single tags: 15 to 21 % of small ones in real pictures
 _LATENCY_S, _LATENCY_JITTER_S = 0.030, 0.8e-3  # s from mid-exposure to publishing
 _STAMP_JITTER_SD = 0.2e-3
 
-_BLOB = np.array([0.0, -0.02, -0.09])  # m, foot frame: middle of what a depth camera sees of a shoe from above
+_BLOB = np.array([0.0, -0.03, -0.11])  # m, foot frame: middle of what a depth camera sees of a shoe from above
 _BLOB_SD = 0.008  # m, per shoe
 _BLOB_WANDER, _BLOB_TAU_S = 0.004, 0.8  # m, as the visible part changes
 _BLOB_PX = 1.5  # px SD
@@ -102,7 +102,7 @@ class Pictures:
 
 def pictures(seconds: float, random: np.random.Generator) -> Pictures:
     """A run of the camera."""
-    middle = (float(random.random()) + np.arange(math.ceil(seconds * FPS))) / FPS
+    middle = np.asarray((float(random.random()) + np.arange(math.ceil(seconds * FPS))) / FPS, dtype=np.float64)
     middle = middle[middle < seconds]
     t_pub = np.maximum.accumulate(middle + _LATENCY_S + random.exponential(_LATENCY_JITTER_S, len(middle)))
     lens = _LENS_PX * random.standard_normal((2, 2))
@@ -115,7 +115,6 @@ def markers(
     """What the marker tracker finds of one foot."""
     mount = settings.camera.mount
     placed = settings.feet.of(side).marker
-    target = settings.camera.targets.of(side)
     n = len(run.middle)
     t = camera.row_times(truth, run.middle, (side, np.asarray(placed.p)), mount, faults)
     eye = camera.eye(truth, t, mount, faults)
@@ -216,10 +215,12 @@ def blobs(
     middle = middle + noise.gauss_markov(random, n, 1.0 / FPS, _BLOB_TAU_S, _BLOB_WANDER)
     foot_p, foot_q = truth.feet[side].pose(t)
     points = foot_p + rotations.rotate(foot_q, middle)
+    # The leg above hides the ankle from nearly everywhere: the blob is there while the front of the shoe is.
+    tips = foot_p + rotations.rotate(foot_q, settings.feet.of(side).toe.p)
     pixels, depth = camera.project(eye, points)
     u, v = pixels[:, 0], pixels[:, 1]
     edge = np.minimum(np.minimum(u, WIDTH - u), np.minimum(v, HEIGHT - v)) - _BLOB_RADIUS_PX
-    found = (depth > 0.3) & (edge > 0.0) & ~camera.hidden(truth, points, eye, settings)
+    found = (depth > 0.3) & (edge > 0.0) & ~camera.hidden(truth, tips, eye, settings)
     found &= random.random(n) >= _BLOB_MISS
     depth = np.maximum(depth, 0.05)
     # "Depth at the blob's nearest valid pixel": one pixel, not the median of many.

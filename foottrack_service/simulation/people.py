@@ -27,11 +27,6 @@ from foottrack_service.simulation.truth import FootTrack, Truth, grid
 Feet = Literal["mild", "hard"]
 
 
-def still(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
-    """Standing at ease."""
-    return _scene(seconds, settings, feet, random, Planner(random), Bearing(gaze_sd=math.radians(0.6), sway_sd=0.004))
-
-
 def head_moving(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
     """Feet still, the head turns, nods, tilts and shifts."""
     bearing = Bearing(gaze_sd=math.radians(8.0), gaze_band_hz=0.6, sway_sd=0.03, sway_band_hz=0.5)

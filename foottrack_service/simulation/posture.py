@@ -14,7 +14,7 @@ from foottrack_service.simulation.anatomy import EYES_FROM_NECK, Person
 from foottrack_service.simulation.footsteps import FootSamples
 from foottrack_service.simulation.truth import GRID_HZ, Track
 
-_REACH = 0.985
+_REACH = 0.99
 """Largest share of a leg's length that is used: nobody walks on locked knees."""
 _HIPS_AHEAD = 0.03
 """m: standing, the hips are a little before the ankles."""
@@ -56,7 +56,7 @@ def carried(
     hips = _hips(left, right, facing, bearing, person)
     sway = noise.wander(random, n, GRID_HZ, bearing.sway_band_hz, bearing.sway_sd)
     hips += sway * [1.0, 0.0, 1.0]
-    standing = person.hip_height - np.asarray(extra.crouch) + 0.3 * (sway[:, 1] - 2.0 * bearing.sway_sd)
+    standing = person.hip_height - np.asarray(extra.crouch) + 0.1 * (sway[:, 1] - 2.0 * bearing.sway_sd)
     hips[:, 1] = _height(hips, left, right, facing, person, standing)
 
     gaze = noise.wander(random, n, GRID_HZ, bearing.gaze_band_hz, bearing.gaze_sd)

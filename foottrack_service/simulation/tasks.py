@@ -30,7 +30,7 @@ class Task:
 TASKS: dict[str, Task] = {
     task.name: task
     for task in (
-        Task("still", "standing at ease, feet and head as still as a person can", 20.0, people.still),
+        Task("still", "bench: headset fixed at 1.5 m, trackers lie on the floor", 60.0, bench.still),
         Task("head-moving", "standing, looking and leaning about with the head", 20.0, people.head_moving),
         Task("steps", "one step forward and back, again and again", 30.0, people.steps),
         Task("side-steps", "one step to the side and back, to both sides", 30.0, people.side_steps),
