@@ -30,6 +30,19 @@ class Reason(StrEnum):
     BODY = "body"
 
 
+REASON_MEANINGS: dict[Reason, str] = {
+    Reason.FRAMES: "not two frames",
+    Reason.TOPIC: "the topic is too long, not UTF-8, malformed, or names no stream of this version",
+    Reason.OVERSIZED: "the payload is too large",
+    Reason.MSGPACK: "the payload is not one msgpack value within the limits, with strings that are UTF-8",
+    Reason.DEPTH: "arrays and maps too deep inside one another",
+    Reason.ENVELOPE: "the payload is no map, or a key of the envelope is missing or of a wrong type",
+    Reason.VERSION: "another protocol major",
+    Reason.NOT_FINITE: "a NaN or an infinity where a number is due",
+    Reason.BODY: "the body is not what its topic promises",
+}
+
+
 class ProtocolError(Exception):
     """Base of all errors of this package."""
 

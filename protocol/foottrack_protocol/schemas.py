@@ -74,5 +74,11 @@ class _Untitled(GenerateJsonSchema):
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False
 
+    def field_is_required(self, field: Any, total: bool) -> bool:
+        # A union's tag has a default for whoever makes the body in Python; on the wire it must be there.
+        inner = field["schema"]
+        tag = inner["type"] == "default" and inner["schema"]["type"] == "literal"
+        return tag or super().field_is_required(field, total)
+
     def bytes_schema(self, schema: core_schema.BytesSchema) -> JsonSchemaValue:
         return {"type": "string"}

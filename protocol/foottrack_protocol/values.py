@@ -80,7 +80,7 @@ Velocity = Annotated[Vec3, _in("m/s")]
 Acceleration = Annotated[Vec3, _in("m/s^2")]
 AngularRate = Annotated[Vec3, _in("rad/s")]
 Quat = Annotated[tuple[Float, Float, Float, Float], AfterValidator(_unit_length), _in("x, y, z, w")]
-Direction = Annotated[Vec3, AfterValidator(_unit_length), _in("unit")]
+Direction = Annotated[Vec3, AfterValidator(_unit_length), _in("length 1")]
 Cov3 = Annotated[tuple[Float, Float, Float, Float, Float, Float], AfterValidator(_semidefinite), _in("m^2")]
 
 Side = Literal["left", "right"]
@@ -91,7 +91,7 @@ Phase = Literal["stance", "ascending", "mid_swing", "descending", "terminal_swin
 class Body(BaseModel):
     """Base of all bodies: unknown keys are ignored, so that minor versions may add some. Immutable."""
 
-    model_config = ConfigDict(extra="ignore", frozen=True, ser_json_bytes="base64", val_json_bytes="base64")
+    model_config = ConfigDict(extra="ignore", frozen=True)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with some keys changed, validated like any other (pydantic's own is not). Raises ValidationError."""

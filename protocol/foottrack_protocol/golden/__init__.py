@@ -1,0 +1,1 @@
+"""The golden messages in ``vectors/``, which every client decodes in its tests."""
