@@ -1,0 +1,71 @@
+"""What all tests share: a ZeroMQ context that cannot hang, a bus on ports of its own, coroutines run to their end."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import threading
+from collections.abc import Callable, Coroutine, Iterator
+from typing import Any, TypeVar
+
+import pytest
+import zmq
+
+from foottrack_service.bus import Broker, Bus
+from foottrack_service.bus.endpoints import Context
+from foottrack_service.config import BusSettings
+
+EPHEMERAL = BusSettings(ingress="tcp://127.0.0.1:0", egress="tcp://127.0.0.1:0", control="tcp://127.0.0.1:0")
+LEAK_TIMEOUT_S = 5.0
+TEST_TIMEOUT_S = 30.0
+
+T = TypeVar("T")
+Run = Callable[[Coroutine[Any, Any, T]], T]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _selector_loop() -> None:
+    """Windows: pyzmq's descriptors need the selector loop, as in the service."""
+    if sys.platform == "win32":
+        asyncio.set_event_loop_policy(asyncio.WindowsSelectorEventLoopPolicy())
+
+
+@pytest.fixture
+def run() -> Run[Any]:
+    """Runs a coroutine in a new event loop; one that does not end fails the test."""
+
+    def _run(coroutine: Coroutine[Any, Any, T]) -> T:
+        async def limited() -> T:
+            async with asyncio.timeout(TEST_TIMEOUT_S):
+                return await coroutine
+
+        return asyncio.run(limited())
+
+    return _run
+
+
+@pytest.fixture
+def context() -> Iterator[Context]:
+    """A context; a socket that a test leaves open fails it instead of hanging it."""
+    made: Context = zmq.Context()
+    made.linger = 0
+    yield made
+    end = threading.Thread(target=made.term, daemon=True)
+    end.start()
+    end.join(LEAK_TIMEOUT_S)
+    if end.is_alive():
+        pytest.fail("the test left a ZeroMQ socket open")
+
+
+@pytest.fixture
+def broker(context: Context) -> Iterator[Broker]:
+    """A running broker: ``broker.endpoints`` over TCP, ``broker.inproc`` in the context."""
+    with Broker(EPHEMERAL, context) as made:
+        yield made
+
+
+@pytest.fixture
+def bus(broker: Broker, context: Context) -> Iterator[Bus]:
+    """A connection to that broker over TCP, as another process has it."""
+    with Bus.connect(broker.endpoints, context) as made:
+        yield made
