@@ -1,0 +1,1 @@
+"""Walk cycles: key poses in, a walk without foot slip out."""
