@@ -7,6 +7,7 @@ import logging
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -18,6 +19,7 @@ from foottrack_service.bus.log import BusLogHandler
 from foottrack_service.bus.session import SessionInfo, publish_session
 from foottrack_service.config import Settings
 from foottrack_service.fusion import node as fusion_node
+from foottrack_service.recording import node as recording_node
 
 NodeRun = Callable[[Bus, Settings], Awaitable[None]]
 
@@ -44,6 +46,15 @@ NODES: dict[str, Node] = {
     "fusion": Node("fusion", fusion_node.run, vital=True),
 }
 """Nodes by the name that ``foottrack node NAME`` takes."""
+
+
+def recorder_node(path: Path) -> Node:
+    """Records everything into ``path``. Vital: a person who asked for a recording wants to know when there is none."""
+
+    async def run(bus: Bus, settings: Settings) -> None:
+        await recording_node.run(bus, settings, path, on_started=lambda _: bus.health.node("recorder", "running"))
+
+    return Node("recorder", run, vital=True)
 
 
 class Service:
@@ -89,6 +100,17 @@ class Service:
         task = asyncio.get_running_loop().create_task(self._supervise(node), name=node.name)
         self._tasks.append(task)
         return task
+
+    async def running(self, name: str) -> None:
+        """Wait until a node runs. Raises NodeFailed when a vital one fails meanwhile."""
+        assert self._failure is not None
+        waiting = asyncio.ensure_future(self.bus.health.wait_running(name))
+        try:
+            await asyncio.wait({waiting, self._failure}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            waiting.cancel()
+        if self._failure.done():
+            self._failure.result()
 
     async def failed(self) -> None:
         """Wait until a vital node fails. Raises NodeFailed."""

@@ -29,6 +29,7 @@ class HealthBoard:
 
     def __init__(self) -> None:
         self._nodes: dict[str, NodeHealth] = {}
+        self._running: dict[str, asyncio.Event] = {}
         self._filters: dict[str, FilterHealth] = {}
         self._latencies: deque[int] = deque(maxlen=_MAX_LATENCIES)
         self._seen: dict[str, int] = {}
@@ -42,6 +43,15 @@ class HealthBoard:
         before = self._nodes.get(name)
         restarts = (before.restarts if before else 0) + (state == "restarting")
         self._nodes[name] = NodeHealth(state=state, restarts=restarts, error=error)
+        event = self._running.setdefault(name, asyncio.Event())
+        if state == "running":
+            event.set()
+        else:
+            event.clear()
+
+    async def wait_running(self, name: str) -> None:
+        """Wait until a node says that it runs: what is published from then on reaches it."""
+        await self._running.setdefault(name, asyncio.Event()).wait()
 
     def filter(self, name: str, accepted: Mapping[str, int], rejected: Mapping[str, int]) -> None:
         """What the filter ``user/side`` did with its measurements since its start: by kind, by reason."""

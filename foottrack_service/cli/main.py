@@ -8,7 +8,7 @@ import typer
 
 from foottrack_protocol.errors import ProtocolError
 from foottrack_service.bus.errors import BusError
-from foottrack_service.cli import running, service, watch
+from foottrack_service.cli import bench, demo, running, service, sim, watch
 from foottrack_service.config import ConfigError
 
 app = typer.Typer(
@@ -17,10 +17,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Tracks a person's feet for virtual reality and streams them to any engine. Begin with: foottrack demo",
 )
+app.command()(demo.demo)
 app.command()(service.run)
 app.command()(service.node)
+app.command()(sim.sim)
 app.command()(watch.top)
 app.command()(watch.echo)
+app.command()(bench.bench)
 
 
 def main() -> None:

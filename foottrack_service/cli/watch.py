@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import time
@@ -93,6 +94,20 @@ def echo(
         run_loop(_echo(settings, topic, count, as_json))
 
 
+def rates_table(rows: dict[str, dict[str, float | int | None]]) -> Table:
+    """The table of ``StreamRates.rows``."""
+    table = Table(title="foottrack", title_justify="left")
+    table.add_column("topic")
+    for name in ("Hz", "messages", "gaps", "age s", "latency ms"):
+        table.add_column(name, justify="right")
+    for topic, row in rows.items():
+        style = "red" if row["gaps"] else None
+        table.add_row(topic, *(str(value) for value in row.values()), style=style)
+    if not rows:
+        table.add_row("nothing yet", "", "", "", "", "")
+    return table
+
+
 async def _top(settings: Settings, seconds: float | None, as_json: bool) -> None:
     from foottrack_service.bus.connection import Bus
 
@@ -105,16 +120,14 @@ async def _top(settings: Settings, seconds: float | None, as_json: bool) -> None
             await _collect(subscriber, rates, None, end)
             print_json({"streams": rates.rows(bus.clock())})
             return
-        with Live(_table({}), refresh_per_second=4) as live:
+        with Live(rates_table({}), refresh_per_second=4) as live:
             while end is None or time.monotonic() < end:
                 until = time.monotonic() + _REDRAW_S
                 await _collect(subscriber, rates, until, end)
-                live.update(_table(rates.rows(bus.clock())))
+                live.update(rates_table(rates.rows(bus.clock())))
 
 
 async def _collect(subscriber: Subscriber, rates: StreamRates, until: float | None, end: float | None) -> None:
-    import asyncio
-
     stops = [stop for stop in (until, end) if stop is not None]
     try:
         async with asyncio.timeout(max(0.0, min(stops) - time.monotonic())):
@@ -122,19 +135,6 @@ async def _collect(subscriber: Subscriber, rates: StreamRates, until: float | No
                 rates.add(batch)
     except TimeoutError:
         return
-
-
-def _table(rows: dict[str, dict[str, float | int | None]]) -> Table:
-    table = Table(title="foottrack", title_justify="left")
-    table.add_column("topic")
-    for name in ("Hz", "messages", "gaps", "age s", "latency ms"):
-        table.add_column(name, justify="right")
-    for topic, row in rows.items():
-        style = "red" if row["gaps"] else None
-        table.add_row(topic, *(str(value) for value in row.values()), style=style)
-    if not rows:
-        table.add_row("nothing yet", "", "", "", "", "")
-    return table
 
 
 async def _echo(settings: Settings, topic: str, count: int | None, as_json: bool) -> None:

@@ -23,10 +23,12 @@ class Attitude:
     """Sensor and foot against the stage. Until a tag or a calibration fixes the yaw, the toes point to -Z."""
 
     def __init__(self, placement: Placement) -> None:
-        self._sensor_to_foot = np.array(placement.q)
+        self._foot_to_sensor = rot.conjugate(placement.q)
         self._device: Array | None = None
         self._raw: _Ahrs | None = None
         self._yaw: float | None = None
+        self._turn: Array = rot.IDENTITY
+        """By the yaw."""
         self._fixed = False
         self._upright: Array = rot.IDENTITY
         """Foot to stage as tags show it, kept for a foot without an IMU: upright, yaw only."""
@@ -44,7 +46,7 @@ class Attitude:
         if self._device is None:
             return
         if self._yaw is None:
-            self._yaw = -float(rot.yaw_of(self._foot_in_device()))
+            self._set_yaw(-float(rot.yaw_of(self._foot_in_device())))
         self._compose()
 
     def see(self, solutions: list[Array]) -> None:
@@ -62,12 +64,13 @@ class Attitude:
 
     def fix_yaw(self, yaw: float) -> None:
         """Yaw of the device's own frame in the stage, rad."""
-        self._yaw, self._fixed = yaw, True
+        self._set_yaw(yaw)
+        self._fixed = True
         self._compose()
 
     def place(self, placement: Placement) -> None:
         """The sensor sits elsewhere on the shoe than was configured."""
-        self._sensor_to_foot = np.array(placement.q)
+        self._foot_to_sensor = rot.conjugate(placement.q)
         self._compose()
 
     def turn(self, q: Array) -> None:
@@ -77,7 +80,7 @@ class Attitude:
         if self._yaw is None:
             self.foot_to_stage = self._upright
         else:
-            self._yaw += turn
+            self._set_yaw(self._yaw + turn)
             self._compose()
 
     def forget_yaw(self) -> None:
@@ -86,14 +89,16 @@ class Attitude:
 
     def _foot_in_device(self) -> Array:
         assert self._device is not None
-        return rot.multiply(self._device, rot.conjugate(self._sensor_to_foot))
+        return rot.multiply(self._device, self._foot_to_sensor)
+
+    def _set_yaw(self, yaw: float) -> None:
+        self._yaw, self._turn = yaw, rot.from_yaw(yaw)
 
     def _compose(self) -> None:
         if self._device is None or self._yaw is None:
             return
-        turn = rot.from_yaw(self._yaw)
-        self.sensor_to_stage = rot.multiply(turn, self._device)
-        self.foot_to_stage = rot.multiply(turn, self._foot_in_device())
+        self.sensor_to_stage = rot.multiply(self._turn, self._device)
+        self.foot_to_stage = rot.multiply(self.sensor_to_stage, self._foot_to_sensor)
 
 
 class _Ahrs:

@@ -25,7 +25,7 @@ from foottrack_protocol.messages import (
     Side,
 )
 from foottrack_service import rotations as rot
-from foottrack_service.body.pose import Legs, solve_legs
+from foottrack_service.body.legs import Legs, solve_legs
 from foottrack_service.body.skeleton import Skeleton
 from foottrack_service.config import Settings
 from foottrack_service.fusion.foot import Foot
@@ -154,10 +154,11 @@ class FusionCore:
             head = None
         legs = None
         if head is not None:
-            legs = solve_legs(head.p, head.q, {side: found.p for side, found in feet.items()}, self._skeleton)
+            ankles = {side: _vec(found.p) for side, found in feet.items()}
+            legs = solve_legs(head.p.tolist(), head.q.tolist(), ankles, self._skeleton)
         body = BodyPose(
             head=None if head is None else _pose(head.p, head.q),
-            hips=None if legs is None else _pose(legs.hips_p, legs.hips_q),
+            hips=None if legs is None else Pose(p=legs.hips, q=legs.hips_q),
             left=self._foot_pose("left", feet.get("left"), legs),
             right=self._foot_pose("right", feet.get("right"), legs),
         )
@@ -167,8 +168,8 @@ class FusionCore:
         if found is None:
             return None
         return FootPose(
-            hip=None if legs is None else _vec(legs.joints[side]),
-            knee=None if legs is None else _vec(legs.knees[side]),
+            hip=None if legs is None else legs.joints[side],
+            knee=None if legs is None else legs.knees[side],
             ankle=_pose(found.p, found.q),
             toe=_vec(found.p + rot.rotate(found.q, self._toes[side])),
             v=_vec(found.v),

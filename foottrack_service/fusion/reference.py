@@ -6,12 +6,14 @@ taken in order of arrival with the newest head pose, nothing is gated, and the p
 every read whatever its length. All of that is what the thesis did, not what one should do.
 
 Its matrices treat the three axes alike, so the 9 x 9 covariance is a 3 x 3 one over (p, v, a) times the identity:
-``numpy.kron(P, I3)`` is the thesis's matrix. The tests hold it against a plain 9-state filter.
+``numpy.kron(P, I3)`` is the thesis's matrix. It is written out in plain floats, since a sample is on its way to an
+engine meanwhile and arrays of nine numbers cost ten times that; the tests hold it against a plain 9-state filter.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -26,7 +28,7 @@ from foottrack_service.fusion.interface import FootEstimate, ImuSample, OpticalF
 from foottrack_service.fusion.ladder import BALL_68_OF_ONE_AXIS, Ladder
 from foottrack_service.rotations import Array
 
-PROCESS_NOISE = np.diag([2e-4, 6e-5, 0.02])
+PROCESS_NOISE = (2e-4, 6e-5, 0.02)
 """Of p [m^2], v [m^2/s^2], a [m^2/s^4], per axis. The thesis's sigmas, used as variances as it used them."""
 MARKER_NOISE = 1.5e-4
 """m^2, per axis."""
@@ -34,15 +36,20 @@ DEPTH_NOISE = 0.35
 """m^2, per axis."""
 ACCELERATION_NOISE = 0.35
 """m^2/s^4, per axis."""
-INITIAL_COVARIANCE = np.diag([1.0, 0.5625, 225.0])
+INITIAL_VARIANCE = (1.0, 0.5625, 225.0)
+"""Of p, v, a, per axis."""
 STATIONARY_BELOW = 0.5
 """m/s^2: a foot that accelerates less is taken to stand."""
 READ_HZ = 90.0
 AVERAGE = 0.2
 """Weight of the newest read in the exponential average of the output."""
 
-_STATIONARY = np.diag([1.0, 0.0, 0.0])
-_UP_GRAVITY = np.array([0.0, STANDARD_GRAVITY, 0.0])
+POSITION, ACCELERATION = 0, 2
+"""What a measurement is of: its row in (p, v, a)."""
+
+_Matrix = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+_PROCESS: _Matrix = ((PROCESS_NOISE[0], 0.0, 0.0), (0.0, PROCESS_NOISE[1], 0.0), (0.0, 0.0, PROCESS_NOISE[2]))
+_STANDS: _Matrix = ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _FEET_APART = {"left": -0.1, "right": 0.1}
 
 
@@ -56,9 +63,72 @@ class ReferenceOptions:
     """A P A' + Q, or A P A' + W Q W' with W = A: noise that enters before the transition."""
 
 
-def transition(dt: float) -> Array:
-    """Shape (3, 3) over (p, v, a): p += v dt + a dt^2 / 2, v += a dt."""
-    return np.array([[1.0, dt, 0.5 * dt * dt], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+class Kinematics:
+    """Position [m], velocity [m/s], acceleration [m/s^2] of a point, and their covariance, the same for each axis."""
+
+    def __init__(self, options: ReferenceOptions, place: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+        self._options = options
+        self.p = list(place)
+        self.v = [0.0, 0.0, 0.0]
+        self.a = [0.0, 0.0, 0.0]
+        pp, vv, aa = INITIAL_VARIANCE
+        self._covariance: _Matrix = ((pp, 0.0, 0.0), (0.0, vv, 0.0), (0.0, 0.0, aa))
+
+    @property
+    def state(self) -> Array:
+        """Rows p, v, a. Shape (3, 3)."""
+        return np.array([self.p, self.v, self.a])
+
+    @property
+    def covariance(self) -> Array:
+        """Over (p, v, a). Shape (3, 3)."""
+        return np.array(self._covariance)
+
+    @property
+    def variance(self) -> float:
+        """Of the position, per axis, m^2."""
+        return self._covariance[0][0]
+
+    def step(self, dt: float, stationary: bool) -> None:
+        """Predict over dt, s: p += v dt + a dt^2 / 2, v += a dt; a stationary point keeps p, and v = a = 0."""
+        half = 0.5 * dt * dt
+        literal = stationary and self._options.stationary_jacobian == "moving"
+        if stationary:
+            self.v, self.a = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+        else:
+            self.p = [p + v * dt + a * half for p, v, a in zip(self.p, self.v, self.a, strict=True)]
+            self.v = [v + a * dt for v, a in zip(self.v, self.a, strict=True)]
+        if stationary and not literal:
+            jacobian = _STANDS
+        else:
+            jacobian = ((1.0, dt, half), (0.0, 1.0, dt), (0.0, 0.0, 1.0))
+        self._covariance = _transformed(jacobian, self._covariance)
+        if self._options.noise == "additive":
+            noise = _PROCESS
+        else:
+            noise = _transformed(jacobian, _PROCESS)
+        self._covariance = _sum(self._covariance, noise)
+
+    def correct(self, row: int, measured: Sequence[float], noise: float) -> None:
+        """Fuse a measured position (POSITION) or acceleration (ACCELERATION) with its variance, per axis."""
+        cov = self._covariance
+        seen = cov[row]
+        scale = 1.0 / (seen[row] + noise)
+        gain_p, gain_v, gain_a = seen[0] * scale, seen[1] * scale, seen[2] * scale
+        before = self.p if row == POSITION else self.a
+        off = [m - b for m, b in zip(measured, before, strict=True)]
+        self.p = [p + gain_p * o for p, o in zip(self.p, off, strict=True)]
+        self.v = [v + gain_v * o for v, o in zip(self.v, off, strict=True)]
+        self.a = [a + gain_a * o for a, o in zip(self.a, off, strict=True)]
+        pp, pv, pa = cov[0][0] - gain_p * seen[0], cov[0][1] - gain_p * seen[1], cov[0][2] - gain_p * seen[2]
+        vv, va, aa = cov[1][1] - gain_v * seen[1], cov[1][2] - gain_v * seen[2], cov[2][2] - gain_a * seen[2]
+        self._covariance = ((pp, pv, pa), (pv, vv, va), (pa, va, aa))
+
+    def move(self, p: Array, q: Array) -> None:
+        """Go with a stage that moved rigidly, old to new."""
+        self.p = (p + rot.rotate(q, self.p)).tolist()
+        self.v = rot.rotate(q, self.v).tolist()
+        self.a = rot.rotate(q, self.a).tolist()
 
 
 class ReferenceFilter:
@@ -76,10 +146,7 @@ class ReferenceFilter:
         self._attitude = Attitude(foot.imu)
         self._ladder = Ladder()
         self._t: int | None = None
-        self.state: Array = np.zeros((3, 3))
-        """Rows p [m], v [m/s], a [m/s^2] of the tag, stage."""
-        self.covariance: Array = INITIAL_COVARIANCE.copy()
-        """Over (p, v, a), the same for each axis."""
+        self._kinematics = Kinematics(self._options)
         self._stationary = False
         self._average: Array | None = None
         self._next_read = 0
@@ -87,13 +154,14 @@ class ReferenceFilter:
     def on_imu(self, sample: ImuSample) -> None:
         """Predict to the sample, then fuse its acceleration unless the foot stands."""
         self._attitude.update(sample)
-        acceleration = rot.rotate(self._attitude.sensor_to_stage, sample.acc) - _UP_GRAVITY
-        self._stationary = math.sqrt(float(acceleration @ acceleration)) < STATIONARY_BELOW
+        ax, ay, az = rot.rotate(self._attitude.sensor_to_stage, sample.acc).tolist()
+        ay -= STANDARD_GRAVITY
+        self._stationary = math.sqrt(ax * ax + ay * ay + az * az) < STATIONARY_BELOW
         if self._t is None:
             self._begin(self._start + rot.rotate(self._attitude.foot_to_stage, self._tag_arm), sample.t)
         self._step_to(sample.t)
         if not self._stationary:
-            self._correct(2, acceleration, ACCELERATION_NOISE)
+            self._kinematics.correct(ACCELERATION, (ax, ay, az), ACCELERATION_NOISE)
         self._ladder.saw_imu(sample.t)
 
     def on_fix(self, fix: OpticalFix, now: int) -> Verdict:
@@ -110,7 +178,7 @@ class ReferenceFilter:
             self._begin(place, now)
         else:
             self._step_to(now)
-        self._correct(0, place, MARKER_NOISE if fix.kind == "marker" else DEPTH_NOISE)
+        self._kinematics.correct(POSITION, place.tolist(), MARKER_NOISE if fix.kind == "marker" else DEPTH_NOISE)
         self._ladder.saw_fix(fix.kind, fix.t)
         return Verdict.ACCEPTED
 
@@ -134,8 +202,7 @@ class ReferenceFilter:
             self._attitude.forget_yaw()
             return
         self._attitude.turn(q)
-        self.state = rot.rotate(q, self.state)
-        self.state[0] += p
+        self._kinematics.move(p, q)
         if self._average is not None:
             self._average = p + rot.rotate(q, self._average)
 
@@ -145,21 +212,21 @@ class ReferenceFilter:
             return None
         if self._average is None or t >= self._next_read:
             self._step_to(t)
+            place = np.array(self._kinematics.p)
             if self._average is None:
-                self._average = self.state[0].copy()
-                self._next_read = t
-            self._average = (1.0 - AVERAGE) * self._average + AVERAGE * self.state[0]
+                self._average, self._next_read = place, t
+            self._average = (1.0 - AVERAGE) * self._average + AVERAGE * place
             period = round(1e9 / READ_HZ)
             # The grid stays where it was, so that outputs at 100 Hz are still read 90 times a second.
             self._next_read += period * (1 + max(0, t - self._next_read) // period)
         q = self._attitude.foot_to_stage
         ankle = self._average - rot.rotate(q, self._tag_arm)
-        sigma = min(BALL_68_OF_ONE_AXIS * math.sqrt(max(0.0, float(self.covariance[0, 0]))), 1e6)
+        sigma = min(BALL_68_OF_ONE_AXIS * math.sqrt(max(0.0, self._kinematics.variance)), 1e6)
         return FootEstimate(
             t=t,
             p=ankle,
             q=q,
-            v=self.state[1].copy(),
+            v=np.array(self._kinematics.v),
             contact=self._stands(ankle, t),
             stage=self._ladder.stage(t, sigma),
             sigma=sigma,
@@ -167,33 +234,40 @@ class ReferenceFilter:
         )
 
     def _begin(self, place: Array, t: int) -> None:
-        self.state = np.zeros((3, 3))
-        self.state[0] = place
-        self.covariance = INITIAL_COVARIANCE.copy()
+        self._kinematics = Kinematics(self._options, place.tolist())
         self._t, self._average = t, None
 
     def _step_to(self, t: int) -> None:
         assert self._t is not None
         dt = max(0, t - self._t) * 1e-9
         self._t = max(t, self._t)
-        moving = transition(dt)
-        process = _STATIONARY if self._stationary else moving
-        literal = self._stationary and self._options.stationary_jacobian == "moving"
-        jacobian = moving if literal else process
-        self.state = process @ self.state
-        noise = PROCESS_NOISE
-        if self._options.noise == "through_transition":
-            noise = jacobian @ PROCESS_NOISE @ jacobian.T
-        self.covariance = jacobian @ self.covariance @ jacobian.T + noise
-
-    def _correct(self, row: int, measured: Array, noise: float) -> None:
-        gain = self.covariance[:, row] / (self.covariance[row, row] + noise)
-        self.state += np.outer(gain, measured - self.state[row])
-        self.covariance -= np.outer(gain, self.covariance[row])
-        self.covariance = 0.5 * (self.covariance + self.covariance.T)
+        self._kinematics.step(dt, self._stationary)
 
     def _stands(self, ankle: Array, t: int) -> bool:
         if self._ladder.imu_alive(t):
             return self._stationary
         low = float(ankle[1]) - self._floor < self._ankle_height + 0.03
-        return low and float(np.linalg.norm(self.state[1])) < 0.2
+        return low and math.hypot(*self._kinematics.v) < 0.2
+
+
+def _transformed(a: _Matrix, p: _Matrix) -> _Matrix:
+    """A P A' for an upper triangular A and a symmetric P."""
+    (a00, a01, a02), (_, a11, a12), (_, _, a22) = a
+    (p00, p01, p02), (_, p11, p12), (_, _, p22) = p
+    b00, b01, b02 = (
+        a00 * p00 + a01 * p01 + a02 * p02,
+        a00 * p01 + a01 * p11 + a02 * p12,
+        a00 * p02 + a01 * p12 + a02 * p22,
+    )
+    b11, b12 = a11 * p11 + a12 * p12, a11 * p12 + a12 * p22
+    b22 = a22 * p22
+    c00, c01, c02 = b00 * a00 + b01 * a01 + b02 * a02, b01 * a11 + b02 * a12, b02 * a22
+    c11, c12, c22 = b11 * a11 + b12 * a12, b12 * a22, b22 * a22
+    return ((c00, c01, c02), (c01, c11, c12), (c02, c12, c22))
+
+
+def _sum(a: _Matrix, b: _Matrix) -> _Matrix:
+    (a00, a01, a02), (_, a11, a12), (_, _, a22) = a
+    (b00, b01, b02), (_, b11, b12), (_, _, b22) = b
+    c01, c02, c12 = a01 + b01, a02 + b02, a12 + b12
+    return ((a00 + b00, c01, c02), (c01, a11 + b11, c12), (c02, c12, a22 + b22))

@@ -1,0 +1,213 @@
+"""``foottrack demo``: the whole pipeline on simulated hardware, with the errors against the simulation's truth."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections import defaultdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+
+from foottrack_protocol import Message
+from foottrack_protocol.frames import SIDES
+from foottrack_service.bus.clock import BusClock
+from foottrack_service.bus.subscriber import Received
+from foottrack_service.cli.running import ConfigOption, JsonOption, print_json, run_loop, settings_for
+from foottrack_service.cli.watch import StreamRates, rates_table
+from foottrack_service.config import Settings
+from foottrack_service.evaluation.statistics import summary_mm
+from foottrack_service.evaluation.truth import TruthTrack
+
+_REDRAW_S = 0.25
+
+
+def demo(
+    seconds: Annotated[float, typer.Option("--seconds", min=2.0, help="How long.")] = 20.0,
+    task: Annotated[str, typer.Option("--task", help="What the simulated person does; an unknown one lists them.")] = (
+        "walk-in-place"
+    ),
+    seed: Annotated[int, typer.Option("--seed", help="Another seed is another person with other noise.")] = 1,
+    imu_hz: Annotated[
+        float, typer.Option("--imu-hz", min=20.0, max=1000.0, help="Rate of the simulated IMUs.")
+    ] = 100.0,
+    record: Annotated[Path | None, typer.Option("--record", help="Write a recording (MCAP) as well.")] = None,
+    listen: Annotated[
+        str | None,
+        typer.Option("--listen", metavar="ADDRESS", help="First of three ports, such as 7701; 0 is free ones."),
+    ] = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Track two simulated feet, live, and say how far off they were. Engines can connect meanwhile.
+
+    Example: foottrack demo --seconds 30 --task walk --record walk.mcap
+    """
+    settings = settings_for(config, None, listen)
+    watched = Watched()
+    try:
+        run_loop(_demo(settings, task, seed, seconds, imu_hz, record, watched, quiet=as_json))
+    except KeyboardInterrupt:
+        typer.echo("Stopped early.", err=True)
+    results = watched.results()
+    if as_json:
+        print_json(results)
+    else:
+        _show(results, record)
+
+
+class Watched:
+    """What a subscriber of the demo saw."""
+
+    def __init__(self) -> None:
+        self.streams: dict[str, dict[str, float]] = {}
+        self.seconds = 0.0
+        self._truth: dict[str, list[Message]] = defaultdict(list)
+        self._poses: list[Message] = []
+        self._latencies: list[int] = []
+        self._imu_published: int | None = None
+
+    def add(self, batch: list[Received]) -> None:
+        """Keep what the errors and latencies are computed from."""
+        for received in batch:
+            message = received.message
+            if message.stream.startswith("imu/"):
+                self._imu_published = message.t_pub
+            elif message.stream.startswith("truth/"):
+                self._truth[message.stream].append(message)
+            elif message.stream == "pose/body":
+                self._poses.append(message)
+                if self._imu_published is not None:
+                    self._latencies.append(received.arrival - self._imu_published)
+                    self._imu_published = None
+
+    def results(self) -> dict[str, Any]:
+        """The object that ``--json`` prints."""
+        latency = np.percentile(np.array(self._latencies) * 1e-6, [50, 99]) if self._latencies else (None, None)
+        return {
+            "seconds": round(self.seconds, 3),
+            "streams": self.streams,
+            "error_mm": {side: self._errors(side) for side in SIDES},
+            "latency_ms": {
+                name: None if value is None else round(float(value), 3)
+                for name, value in zip(("p50", "p99"), latency, strict=True)
+            },
+        }
+
+    def _errors(self, side: str) -> dict[str, float | None]:
+        truth = self._truth[f"truth/{side}"]
+        feet = [(pose.t, getattr(pose.data, side)) for pose in self._poses]
+        # A foot that no camera has seen yet stands where it was put: there is nothing to compare.
+        seen = [(t, foot.ankle.p) for t, foot in feet if foot is not None and foot.age is not None]
+        if len(truth) < 4 or not seen:
+            return summary_mm(np.array([]))
+        track = TruthTrack([m.t for m in truth], [m.data.p for m in truth], [m.data.q for m in truth])
+        t = np.array([stamp for stamp, _ in seen])
+        covered = track.covers(t)
+        p = np.array([place for _, place in seen])[covered]
+        return summary_mm(np.linalg.norm(p - track.position(t[covered]), axis=1))
+
+
+async def _demo(
+    settings: Settings,
+    task: str,
+    seed: int,
+    seconds: float,
+    imu_hz: float,
+    record: Path | None,
+    watched: Watched,
+    quiet: bool,
+) -> None:
+    from foottrack_service.app import NODES, Service, recorder_node
+    from foottrack_service.cli.sim import scenario_for
+    from foottrack_service.simulation import node as simulation
+
+    scenario = scenario_for(task, seed, settings, seconds=seconds, imu_hz=imu_hz)
+    async with Service(settings) as service:
+        service.start(NODES["fusion"])
+        await service.running("fusion")
+        if record is not None:
+            service.start(recorder_node(record))
+            await service.running("recorder")
+        subscriber = service.bus.subscriber()
+        await subscriber.ready()
+        rates = StreamRates(subscriber)
+        began = service.bus.clock()
+        play = asyncio.ensure_future(simulation.run(service.bus, settings, scenario))
+        console = Console(stderr=True)
+        shown = Live(console=console, auto_refresh=False, transient=True) if not quiet and sys.stderr.isatty() else None
+        if shown is None and not quiet:
+            console.print(f"{task}, {seconds:g} s, publishers on {service.endpoints.ingress} ...")
+        try:
+            if shown is not None:
+                shown.start()
+            await _watch(subscriber, play, rates, watched, shown, service.bus.clock, seconds)
+        finally:
+            if shown is not None:
+                shown.stop()
+            now = service.bus.clock()
+            watched.seconds = (now - began) * 1e-9
+            watched.streams = {
+                topic: {"hz": round(row["messages"] / watched.seconds, 1), "gaps": row["gaps"]}
+                for topic, row in rates.rows(now).items()
+            }
+            play.cancel()
+            await asyncio.gather(play, return_exceptions=True)
+
+
+async def _watch(
+    subscriber: Any,
+    play: asyncio.Future[None],
+    rates: StreamRates,
+    watched: Watched,
+    shown: Live | None,
+    clock: BusClock,
+    seconds: float,
+) -> None:
+    loop = asyncio.get_running_loop()
+    redraw = loop.time()
+    began = clock()
+    batches = aiter(subscriber.batches())
+    pending = asyncio.ensure_future(anext(batches))
+    try:
+        while not play.done():
+            await asyncio.wait({play, pending}, return_when=asyncio.FIRST_COMPLETED)
+            if pending.done():
+                batch = pending.result()
+                rates.add(batch)
+                watched.add(batch)
+                pending = asyncio.ensure_future(anext(batches))
+            if shown is not None and loop.time() >= redraw:
+                redraw = loop.time() + _REDRAW_S
+                now = clock()
+                done = min(1.0, (now - began) * 1e-9 / seconds)
+                bar = ProgressBar(total=1.0, completed=done, width=60)
+                shown.update(Group(rates_table(rates.rows(now)), bar), refresh=True)
+    finally:
+        pending.cancel()
+        await asyncio.gather(pending, return_exceptions=True)
+    play.result()
+
+
+def _show(results: dict[str, Any], record: Path | None) -> None:
+    console = Console()
+    table = Table(title=f"Error of the ankle against the truth, mm ({results['seconds']:.0f} s)", title_justify="left")
+    table.add_column("foot")
+    for name in ("mean", "median", "p95", "max"):
+        table.add_column(name, justify="right")
+    for side, errors in results["error_mm"].items():
+        table.add_row(side, *("-" if value is None else f"{value:.1f}" for value in errors.values()))
+    console.print(table)
+    latency = results["latency_ms"]
+    if latency["p50"] is not None:
+        console.print(f"IMU sample published -> pose at a subscriber: {latency['p50']} ms p50, {latency['p99']} ms p99")
+    gaps = sum(stream["gaps"] for stream in results["streams"].values())
+    console.print(f"{len(results['streams'])} streams, {gaps} messages lost.")
+    if record is not None:
+        console.print(f"Recorded to {record}. Look at it with: foottrack log info {record}")

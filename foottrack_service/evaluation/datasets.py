@@ -1,0 +1,145 @@
+"""Public recordings of foot-worn IMUs with a reference, read into the wire's frames. Their data is not part of this.
+
+``gaitmap``: both feet, 204.8 Hz, motion capture of heels and toes. ``llio_pyshoe_vicon_dev``: one foot, 200 Hz, Vicon.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from foottrack_protocol import Message
+from foottrack_protocol.messages import Imu, Side
+from foottrack_service import rotations as rot
+from foottrack_service.config import Settings
+from foottrack_service.rotations import Array
+
+GAITMAP_HZ = 204.8
+GAITMAP_MOCAP_HZ = 100.0
+_FORWARD_LEFT_UP_TO_FOOT = rot.from_matrix(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]))
+"""gaitmap's sensor axes (x forward, y left, z up) to the foot's (+X right, +Y up, -Z to the toes)."""
+_FORWARD_RIGHT_DOWN_TO_FOOT = rot.from_matrix(np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]))
+"""z down; x roughly to the toes (the sensor sits tilted on the instep)."""
+
+
+class DatasetError(Exception):
+    """A recording that is not there or not as its description says; the text names the file."""
+
+
+@dataclass(frozen=True, slots=True)
+class FootTrial:
+    """One foot's IMU, and where that foot was."""
+
+    name: str
+    side: Side
+    t: Array
+    """s, shape (n,)."""
+    acc: Array
+    """Specific force, sensor frame, m/s^2, shape (n, 3)."""
+    gyro: Array
+    """rad/s, shape (n, 3)."""
+    sensor_to_foot: Array
+    true_t: Array
+    """s, shape (m,)."""
+    true_xy: Array
+    """Reference on the floor, m, shape (m, 2)."""
+    marks: dict[str, Array] = field(default_factory=dict)
+    """Other reference points, m, shape (m, 3), z up: ``heel``, ``toe``."""
+
+
+def gaitmap(folder: Path) -> list[FootTrial]:
+    """Both feet of the gaitmap example. Raises DatasetError."""
+    imu_head, imu = _table(folder / "imu_sample.csv", 2)
+    mocap_head, mocap = _table(folder / "mocap_sample.csv", 2)
+    trials = []
+    sides: tuple[Side, ...] = ("left", "right")
+    for side in sides:
+        acc = _columns(imu_head, imu, [(f"{side}_sensor", f"acc_{axis}") for axis in "xyz"])
+        gyro = np.radians(_columns(imu_head, imu, [(f"{side}_sensor", f"gyr_{axis}") for axis in "xyz"]))
+        letter = side[0].upper()
+        marks = {
+            name: 1e-3 * _columns(mocap_head, mocap, [(f"{letter}_{label}", axis) for axis in "xyz"])
+            for name, label in (("heel", "FCC"), ("toe", "TOE"))
+        }
+        trials.append(
+            FootTrial(
+                name=f"gaitmap {side}",
+                side=side,
+                t=np.arange(len(acc)) / GAITMAP_HZ,
+                acc=acc,
+                gyro=gyro,
+                sensor_to_foot=_FORWARD_LEFT_UP_TO_FOOT,
+                true_t=np.arange(len(mocap)) / GAITMAP_MOCAP_HZ,
+                true_xy=marks["heel"][:, :2],
+                marks=marks,
+            )
+        )
+    return trials
+
+
+def pyshoe(file: Path) -> FootTrial:
+    """One Vicon trial of the pyshoe set. Raises DatasetError."""
+    try:
+        with np.load(file) as data:
+            columns = {key: np.asarray(data[key], dtype=np.float64) for key in ("t", "acc", "gyr", "vicon_xy")}
+    except (OSError, KeyError, ValueError) as error:
+        raise DatasetError(f"{file}: {error}") from None
+    # Navigated in z-down axes and looked at from above: the lateral axis is mirrored.
+    true_xy = columns["vicon_xy"] * [1.0, -1.0]
+    t = columns["t"]
+    return FootTrial(
+        f"pyshoe {file.stem}", "right", t, columns["acc"], columns["gyr"], _FORWARD_RIGHT_DOWN_TO_FOOT, t, true_xy
+    )
+
+
+def messages(trials: list[FootTrial], settings: Settings, start: int = 0) -> Iterator[tuple[int, Message]]:
+    """The trials' samples as an IMU producer publishes them, in order of arrival (ns, with ``start`` as zero)."""
+    order = sorted(
+        (start + round(float(t) * 1e9), trial.side, index, trial) for trial in trials for index, t in enumerate(trial.t)
+    )
+    counts = {"left": 0, "right": 0}
+    for t, side, index, trial in order:
+        acc, gyro = trial.acc[index].tolist(), trial.gyro[index].tolist()
+        body = Imu(acc=(acc[0], acc[1], acc[2]), gyro=(gyro[0], gyro[1], gyro[2]), t_arr=t)
+        yield t, Message(settings.user, f"imu/{side}", f"imu-{side}", "dataset", counts[side], t, t, True, body)
+        counts[side] += 1
+
+
+def settings_with(trials: list[FootTrial], settings: Settings) -> Settings:
+    """Settings that know how the trials' sensors sit on the feet."""
+    values = settings.model_dump()
+    for trial in trials:
+        values["feet"][trial.side]["imu"]["q"] = tuple(trial.sensor_to_foot.tolist())
+    return Settings(**values)
+
+
+def aligned_rmse(estimate: Array, truth: Array) -> float:
+    """RMS distance of two tracks on the floor, m, after the rigid 2-D motion (no scale) that brings them closest.
+
+    Shapes (n, 2). Kabsch's method.
+    """
+    a, b = estimate - estimate.mean(axis=0), truth - truth.mean(axis=0)
+    u, _, vt = np.linalg.svd(a.T @ b)
+    turn = u @ np.diag([1.0, np.linalg.det(u @ vt)]) @ vt
+    return float(np.sqrt(np.mean(np.sum((a @ turn - b) ** 2, axis=1))))
+
+
+def _table(file: Path, header_rows: int) -> tuple[list[tuple[str, ...]], Array]:
+    try:
+        with file.open(newline="", encoding="utf-8") as stream:
+            rows = list(csv.reader(stream))
+        values = np.array([[float(cell) for cell in row[1:]] for row in rows[header_rows:]])
+    except (OSError, ValueError) as error:
+        raise DatasetError(f"{file}: {error}") from None
+    return list(zip(*(row[1:] for row in rows[:header_rows]), strict=True)), values
+
+
+def _columns(header: list[tuple[str, ...]], values: Array, names: list[tuple[str, str]]) -> Array:
+    try:
+        return values[:, [header.index(name) for name in names]]
+    except ValueError as error:
+        raise DatasetError(f"a column is missing: {error}") from None
