@@ -53,6 +53,7 @@ class RecordingFile:
             self._writer.start(PROFILE, f"{LIBRARY} {version('foottrack')}")
             if config_toml is not None:
                 self._writer.add_attachment(created, created, CONFIG_NAME, "application/toml", config_toml.encode())
+            self._stream.flush()
         except OSError as error:
             raise self._refused(error) from error
 
