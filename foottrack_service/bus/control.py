@@ -15,7 +15,7 @@ from foottrack_protocol.envelope import pack_map, unpack_map
 from foottrack_protocol.errors import DecodeError, EncodeError
 from foottrack_protocol.messages import Health, Session
 from foottrack_service.bus.clock import BusClock, now
-from foottrack_service.bus.endpoints import HWM, MAX_FRAME_BYTES, Context, bind
+from foottrack_service.bus.endpoints import HWM, MAX_FRAME_BYTES, Context, bind, release
 from foottrack_service.bus.errors import BusError, ControlError
 from foottrack_service.bus.health import HealthBoard
 from foottrack_service.bus.session import SessionInfo
@@ -88,9 +88,10 @@ class ControlServer:
                 await self._watch.readable()
 
     def close(self) -> None:
-        """Close the socket; ``run`` ends when its handlers have."""
+        """Close the socket, and with it the port; ``run`` ends when its handlers have."""
         if not self._socket.closed:
             self._watch.close()
+            release(self._socket, self.endpoint)
             self._socket.close(0)
 
     def _take(self, frames: list[bytes], tasks: asyncio.TaskGroup) -> None:

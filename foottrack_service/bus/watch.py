@@ -7,6 +7,7 @@ socket's events takes the word back. So the events are asked after arming, after
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 
 import zmq
 
@@ -26,6 +27,7 @@ class SocketWatch:
         self._fd: int = socket.fileno()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._waiters: dict[asyncio.Future[None], int] = {}
+        self._on_input: Callable[[], None] | None = None
 
     @property
     def has_input(self) -> bool:
@@ -40,8 +42,20 @@ class SocketWatch:
         """Wait until the socket takes a message, or for ``close``. Always gives the event loop a turn."""
         await self._wait(_POLLOUT)
 
+    def call(self, on_input: Callable[[], None] | None) -> None:
+        """Call this, instead of waking a coroutine, whenever there may be something to read; None ends that.
+
+        It has to read until nothing is left.
+        """
+        self._on_input = on_input
+        if on_input is not None:
+            self._arm()
+            on_input()
+
     def close(self) -> None:
         """Stop watching and wake all who wait; to be called before the socket is closed."""
+        if self._on_input is not None and self._loop is not None:
+            self._loop.call_soon(self._on_input)
         self._disarm()
         self._wake(_POLLIN | _POLLOUT)
 
@@ -49,11 +63,7 @@ class SocketWatch:
         return 0 if self._socket.closed else int(self._socket.get(_EVENTS))
 
     async def _wait(self, wanted: int) -> None:
-        loop = asyncio.get_running_loop()
-        if self._loop is not loop and not self._socket.closed:
-            self._disarm()
-            loop.add_reader(self._fd, self._on_word)
-            self._loop = loop
+        loop = self._arm()
         if self._events() & wanted or self._socket.closed:
             await asyncio.sleep(0)
             return
@@ -64,8 +74,19 @@ class SocketWatch:
         finally:
             del self._waiters[waiter]
 
+    def _arm(self) -> asyncio.AbstractEventLoop:
+        loop = asyncio.get_running_loop()
+        if self._loop is not loop and not self._socket.closed:
+            self._disarm()
+            loop.add_reader(self._fd, self._on_word)
+            self._loop = loop
+        return loop
+
     def _on_word(self) -> None:
-        self._wake(self._events())
+        if self._on_input is not None:
+            self._on_input()
+        if self._waiters:
+            self._wake(self._events())
 
     def _wake(self, events: int) -> None:
         for waiter, wanted in self._waiters.items():
