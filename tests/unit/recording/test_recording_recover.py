@@ -54,8 +54,8 @@ def test_cut_anywhere_the_whole_chunks_before_come_back(tmp_path: Path) -> None:
     data, ends = whole.read_bytes(), chunk_ends(whole)
     with whole.open("rb") as stream:
         edges = [record.offset for record in container.records(stream, whole)]
-    near = {edge + step for edge in edges for step in (-1, 0, 1, 5, 8, 9, 10, 40)}
-    cuts = sorted(near | set(random.Random(2).sample(range(len(data)), 60)))
+    near = {edge + step for edge in edges for step in (-1, 0, 1, 9)}
+    cuts = sorted(near | set(random.Random(2).sample(range(len(data)), 30)))
     for cut in (cut for cut in cuts if 8 <= cut < len(data)):
         report, got = recovered(tmp_path, data[:cut])
         assert got == sent[: CHUNK * bisect_right(ends, cut)], f"cut at {cut}"
