@@ -29,8 +29,7 @@ async def run(bus: Bus, settings: Settings) -> None:
     bus.health.node(SOURCE, "running")
     async with asyncio.TaskGroup() as tasks:
         tasks.create_task(_timer(bus, core, publisher))
-        async for batch in subscriber.batches():
-            _fuse(bus, core, publisher, batch)
+        await subscriber.deliver(lambda batch: _fuse(bus, core, publisher, batch))
 
 
 def _fuse(bus: Bus, core: FusionCore, publisher: Publisher, batch: list[Received]) -> None:
