@@ -47,6 +47,10 @@ class Sole:
     """m behind the ankle, positive."""
     ball_z: float
     """m ahead of the ankle, positive."""
+    toe_z: float
+    """m ahead of the ankle, positive: the toes' tip."""
+    toe_height: float
+    """m from the toes' tip up to the ankle."""
 
     @property
     def heel(self) -> Array:
@@ -71,7 +75,8 @@ def person(body: BodySettings, ankle_height: float) -> Person:
 
 def sole(foot: FootSettings) -> Sole:
     """The sole of one shoe."""
-    return Sole(foot.ankle_height, _HEEL_BEHIND_ANKLE, -_BALL_SHARE * foot.toe.p[2])
+    toe_z = -foot.toe.p[2]
+    return Sole(foot.ankle_height, _HEEL_BEHIND_ANKLE, _BALL_SHARE * toe_z, toe_z, -foot.toe.p[1])
 
 
 def knees(hip: Array, ankle: Array, forward: Array, person: Person) -> Array:

@@ -26,6 +26,7 @@ _HEAD_PITCH = math.radians(-55.0)  # the camera, 20 deg lower, then looks 75 deg
 _AHEAD = 0.25  # m, the trackers before the headset
 _APART = 0.15  # m, each to its side
 _REACH = 0.25  # m, how far things are moved
+_HAND_SWAY = 0.003  # m SD: no hand is as still as a floor
 _STILL_S = 3.0  # at the start, so that filters can settle
 
 
@@ -43,6 +44,7 @@ def tracker_moving(seconds: float, settings: Settings, feet: Feet, random: np.ra
     # A hand holds the tracker above the floor and never quite level.
     path[:, 1] += _REACH * 1.2 * _ease((t - 1.0) / 1.5)
     held = _ease((t - 1.0) / 1.5)[:, None]
+    path += held * noise.wander(random, len(t), GRID_HZ, 1.5, _HAND_SWAY)
     tilt = held * noise.wander(random, len(t), GRID_HZ, 0.8, np.radians([5.0, 6.0, 5.0]))
     return _scene(t, seconds, settings, path, tilt, np.zeros_like(path), np.zeros_like(path))
 

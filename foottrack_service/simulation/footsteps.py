@@ -1,7 +1,7 @@
 """One foot's motion from a plan of steps.
 
-In stance a foot turns about a point that does not move: the heel after the strike, none while it is flat, the ball
-after the heel has left. In between the ankle flies on quintics whose ends have the position, velocity and acceleration
+In stance a foot turns without slipping: about the heel after the strike, not at all while it is flat, over the ball and
+the toes after the heel has left. In between the ankle flies on quintics whose ends have the position, velocity and acceleration
 of the turning foot, so the specific force is continuous throughout.
 """
 
@@ -17,6 +17,7 @@ from scipy.interpolate import BPoly
 from foottrack_service import rotations
 from foottrack_service.rotations import Array
 from foottrack_service.simulation.anatomy import Sole
+from foottrack_service.simulation.rocker import rocker
 from foottrack_service.simulation.truth import Flags
 
 
@@ -129,7 +130,7 @@ def stepping(t: Array, place: Place, steps: Sequence[Step], sole: Sole) -> FootS
 
 def _take(foot: FootSamples, old: Place, step: Step, sole: Sole) -> None:
     style, new, t = step.style, step.place, foot.t
-    off, on = (style.toe_off_pitch, style.toe_off_rate, 0.0), (style.strike_pitch, 0.0, 0.0)
+    off, on = np.array([style.toe_off_pitch, style.toe_off_rate, 0.0]), np.array([style.strike_pitch, 0.0, 0.0])
     instants = [step.heel_off, step.start, step.strike, step.flat]
     pitch = BPoly.from_derivatives(instants, [(0.0, 0.0, 0.0), off, on, (0.0, 0.0, 0.0)])
     rolls = (t >= step.heel_off) & (t < step.start)
@@ -138,13 +139,14 @@ def _take(foot: FootSamples, old: Place, step: Step, sole: Sole) -> None:
     moves = rolls | flies | lands
     foot.pitch[moves] = pitch(t[moves])
 
-    ball = np.array(_ankle(sole.ball_z, sole.ankle_height, foot.pitch[rolls])).T
-    heel = np.array(_ankle(-sole.heel_z, sole.ankle_height, foot.pitch[lands])).T
-    foot.p[rolls] = _in_stage(old, ball + [sole.ball_z, 0.0])
-    foot.p[lands] = _in_stage(new, heel + [-sole.heel_z, 0.0])
+    toes = rocker(sole)
+    forward, up = toes.ankle(foot.pitch[rolls])
+    foot.p[rolls] = _in_stage(old, np.stack([forward + sole.ball_z, up], axis=-1))
+    forward, up = _over_heel(sole, foot.pitch[lands])
+    foot.p[lands] = _in_stage(new, np.stack([forward - sole.heel_z, up], axis=-1))
 
-    take_off = _turning(sole.ball_z, sole.ankle_height, off)
-    touch_down = _turning(-sole.heel_z, sole.ankle_height, on)
+    take_off = _turning(*toes.ankle(off[0]), toes.contact(off[0]), toes.radius(off[0]), off)
+    touch_down = _turning(*_over_heel(sole, on[0]), (-sole.heel_z, sole.ankle_height), 0.0, on)
     take_off[0] += [sole.ball_z, 0.0]
     touch_down[0] += [-sole.heel_z, 0.0]
     ends = np.array(
@@ -166,19 +168,20 @@ def _take(foot: FootSamples, old: Place, step: Step, sole: Sole) -> None:
     foot.toe[(t >= step.start) & (t < step.flat)] = False
 
 
-def _ankle(ahead: float, height: float, pitch: Array | float) -> tuple[Array, Array]:
-    """Ankle from a pivot that lies `ahead` of it on the sole: forward and up, m."""
+def _over_heel(sole: Sole, pitch: Array) -> tuple[Array, Array]:
+    """The ankle's forward and up from the heel on the floor, m."""
     sine, cosine = np.sin(pitch), np.cos(pitch)
-    return height * sine - ahead * cosine, height * cosine + ahead * sine
+    return sole.ankle_height * sine + sole.heel_z * cosine, sole.ankle_height * cosine - sole.heel_z * sine
 
 
-def _turning(ahead: float, height: float, pitch: tuple[float, float, float]) -> Array:
-    """(3, 2): the ankle's forward and up from its pivot, and their first and second derivatives."""
+def _turning(forward: float, up: float, contact: tuple[float, float], radius: float, pitch: Array) -> Array:
+    """(3, 2): the ankle's forward and up, and their derivatives, on a sole that rolls with `pitch` (angle and its two
+    derivatives) about a contact (ahead, below: foot frame, m)."""
     angle, rate, acceleration = pitch
-    forward, up = _ankle(ahead, height, angle)
-    tangent = np.array([up, -forward])
-    inward = np.array([-forward, -up])
-    return np.array([[forward, up], tangent * rate, tangent * acceleration + inward * rate**2])
+    from_contact = contact[1] * np.sin(angle) - contact[0] * np.cos(angle)
+    tangent = np.array([up, -from_contact])
+    bend = np.array([-from_contact, radius - up])
+    return np.array([[forward, up], tangent * rate, tangent * acceleration + bend * rate**2])
 
 
 def _in_stage(place: Place, forward_up: Array) -> Array:

@@ -93,8 +93,8 @@ class Track:
 class FootTrack(Track):
     """A foot: the ankle's motion, and when heel and forefoot stand.
 
-    The foot is rigid (the part that carries the sensors): while only the forefoot stands it turns about the ball, where
-    the toes bend; `heel_point` and `ball_point`, (3,) m in the foot's frame, touch the floor.
+    The foot is rigid. `heel_point` and `ball_point`, (3,) m in its frame, touch the floor while it stands flat; after
+    the strike it turns about the heel, and with its heel up it rolls from the ball to the toes' tip.
     """
 
     def __init__(
