@@ -35,6 +35,7 @@ class Verdict(StrEnum):
     GATE = "gate"
     UNCONFIRMED = "unconfirmed"
     UNUSED = "unused"
+    INVALID = "invalid"
 
 
 @dataclass(frozen=True, slots=True)

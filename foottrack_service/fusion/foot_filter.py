@@ -1,0 +1,100 @@
+"""Our filter of one foot: its IMU with the fixes that correct it, and pictures alone where there is no IMU.
+
+Both run on the same fixes. What leaves is the inertial one while the IMU lives, else the pictures' one, with the stage
+and an honest radius.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+
+import numpy as np
+
+from foottrack_protocol.messages import Side
+from foottrack_service.config import FootSettings, Placement
+from foottrack_service.fusion.foot_filter_inertial import InertialFilter
+from foottrack_service.fusion.interface import FootEstimate, ImuSample, OpticalFix, Verdict
+from foottrack_service.fusion.ladder import BALL_68_OF_ONE_AXIS, Ladder
+from foottrack_service.fusion.pictures_only import PicturesOnlyFilter
+from foottrack_service.rotations import Array
+
+SYSTEMATIC = 0.0025
+"""m per axis: what no amount of agreeing fixes takes away (lens, depth scale, head pose, where the tag is glued)."""
+
+_log = logging.getLogger(__name__)
+
+
+class ErrorStateFilter:
+    """One foot (see interface.FootFilter)."""
+
+    waits_for_head = True
+
+    def __init__(self, foot: FootSettings, side: Side, *, floor: bool = True) -> None:
+        self._inertial = InertialFilter(foot, side, floor=floor)
+        self._pictures = PicturesOnlyFilter(foot)
+        self._ladder = Ladder()
+
+    def on_imu(self, sample: ImuSample) -> None:
+        """Take a sample, in order of arrival."""
+        self._inertial.on_imu(sample)
+        if self._inertial.begun:
+            self._ladder.saw_imu(self._inertial.newest)
+
+    def on_fix(self, fix: OpticalFix, now: int) -> Verdict:
+        """Take an optical fix that arrives at ``now``, later than its own ``t``."""
+        if fix.kind == "depth" and self._ladder.fix_within("marker", fix.t):
+            return Verdict.UNUSED
+        seen = self._pictures.on_fix(fix)
+        verdict = self._inertial.on_fix(fix)
+        if verdict is Verdict.UNUSED:
+            verdict = seen
+        if verdict is Verdict.ACCEPTED:
+            self._ladder.saw_fix(fix.kind, fix.t)
+        return verdict
+
+    def on_floor(self, height: float) -> None:
+        """The floor is at this height in the stage, m."""
+        self._inertial.set_floor(height)
+
+    def on_imu_yaw(self, yaw: float) -> None:
+        """The yaw of the device's own frame in the stage was calibrated, rad."""
+        self._inertial.set_imu_yaw(yaw)
+
+    def on_imu_placement(self, placement: Placement) -> None:
+        """The sensor's place on the shoe was calibrated."""
+        self._inertial.place(placement)
+
+    def on_recentred(self, p: Array | None, q: Array | None) -> None:
+        """The stage moved by the rigid motion old to new, or by an unknown one (None: re-acquire)."""
+        if p is None or q is None:
+            self._inertial.lose()
+            self._pictures.lose()
+        else:
+            self._inertial.move(p, q)
+            self._pictures.move(p, q)
+
+    def estimate(self, t: int) -> FootEstimate | None:
+        """The foot predicted to ``t``; None before anything is known."""
+        inertial, pictures = self._inertial, self._pictures
+        seen = pictures.newest is not None
+        if not inertial.begun and not seen:
+            return None
+        source: InertialFilter | PicturesOnlyFilter = inertial
+        if seen and not (inertial.begun and self._ladder.imu_alive(t)):
+            source = pictures
+        p, q, v, sd = source.predicted(t)
+        sigma = BALL_68_OF_ONE_AXIS * math.hypot(sd, SYSTEMATIC)
+        return FootEstimate(t, p, q, v, source.contact, self._ladder.stage(t, sigma), sigma, self._ladder.age(t))
+
+
+def warm_up() -> None:
+    """Compile the kernels, or read them from the cache, before the first sample needs them; says so when it is slow."""
+    begun = time.perf_counter()
+    _log.info("loading the foot filter (the first start on a machine compiles it: about half a minute)")
+    trial = ErrorStateFilter(FootSettings(), "left")
+    for i in range(12):
+        trial.on_imu(ImuSample(i * 2_500_000, np.array([0.0, 9.80665, 0.0]), np.zeros(3), None))
+    trial.estimate(30_000_000)
+    _log.info("the foot filter is ready after %.1f s", time.perf_counter() - begun)

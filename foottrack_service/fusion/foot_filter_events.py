@@ -1,0 +1,51 @@
+"""What happens to a foot's filter, as rows of numbers that compiled code can replay.
+
+A row holds one event: an IMU sample, an optical fix or a reset (a new start from fixes that agree). The columns of each
+kind are named here; every row has all of them.
+"""
+
+from __future__ import annotations
+
+COLUMNS = 24
+
+KIND = 0
+IMU, FIX, RESET = 0.0, 1.0, 2.0
+
+# An IMU sample, sensor frame.
+ACC = 1
+GYRO = 4
+CLIPPED = 7
+ZERO_SIGMA = 8
+"""m/s per 10 ms; 0 while the foot swings."""
+QUIET_FLAG = 9
+"""1 when the foot is so quiet that the gyro shows its bias."""
+UP = 10
+"""The device's own idea of up, unit, 3 columns; zeros without one."""
+FLOOR = 13
+"""Height of a standing ankle, m; NaN without a floor."""
+MEAN_RATE = 14
+"""1 when GYRO is the mean rate since the last sample (increments of the device's q) and no instantaneous one."""
+
+# An optical fix, stage.
+POINT = 1
+POINT_COV = 4
+"""9 columns."""
+ACCEPTED = 13
+NORMAL = 14
+"""The tag's face, about which its turn is seen best, 3 columns."""
+MEASURED_Q = 17
+"""The sensor's attitude by the tag, 4 columns."""
+TURN_SIGMA = 21
+"""rad; 0 without an attitude."""
+PLACED_DELAY = 22
+"""The time offset with which the fix was put into the timeline, s."""
+
+# A reset: POINT, then
+SPEED = 4
+"""m/s, 3 columns."""
+POINT_SIGMA = 7
+SPEED_SIGMA = 8
+YAW_SIGMA = 9
+"""rad; MEASURED_Q gives the yaw when TURN_SIGMA is not 0."""
+TILT_SIGMA = 10
+"""rad: added to what the tilt is unsure by."""

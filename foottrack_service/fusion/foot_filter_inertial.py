@@ -1,0 +1,402 @@
+"""A foot with an IMU: the error-state filter over its timeline.
+
+Late fixes are put where they belong and what came after is replayed; fixes are gated, and some that agree with each
+other but not with us start the place anew (foot_filter_optical). The output is predicted and held (foot_filter_output).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from foottrack_protocol.messages import Side
+from foottrack_service import rotations as rot
+from foottrack_service.config import FootSettings, Placement
+from foottrack_service.fusion.contact import STATISTIC, stance_sigma
+from foottrack_service.fusion.foot_filter_events import (
+    ACC,
+    ACCEPTED,
+    CLIPPED,
+    FIX,
+    FLOOR,
+    GYRO,
+    IMU,
+    KIND,
+    MEAN_RATE,
+    MEASURED_Q,
+    POINT,
+    POINT_COV,
+    POINT_SIGMA,
+    QUIET_FLAG,
+    RESET,
+    SPEED,
+    SPEED_SIGMA,
+    TURN_SIGMA,
+    UP,
+    YAW_SIGMA,
+    ZERO_SIGMA,
+)
+from foottrack_service.fusion.foot_filter_kernel import NE, NX
+from foottrack_service.fusion.foot_filter_optical import (
+    CHI_SQUARE_1,
+    CHI_SQUARE_3,
+    OLDEST_S,
+    Candidates,
+    FixRows,
+    Rejected,
+    implausible,
+    judged,
+)
+from foottrack_service.fusion.foot_filter_output import CONTACT, follow, predicted
+from foottrack_service.fusion.foot_filter_replay import (
+    ANKLE_ARM,
+    FOOT_UP,
+    HOLE_S,
+    MARKER_ARM,
+    attitude_error,
+    replay,
+    smallest_variances,
+)
+from foottrack_service.fusion.interface import FIX_MEMORY_S, ImuSample, OpticalFix, Verdict
+from foottrack_service.fusion.timeline import Timeline
+from foottrack_service.rotations import Array
+
+FEET_APART = {"left": -0.1, "right": 0.1}
+"""m: where a foot stands that only an IMU knows (PROTOCOL, results)."""
+MOST_RATE = 40.0
+"""rad/s: increments of a device's q that are faster are its own corrections, not the foot."""
+FULL_SCALES = (39.2266, 78.4532, 156.9064)
+"""m/s^2 at which accelerometers end: 4, 8, 16 g."""
+QUIET_STATISTIC = 0.25
+"""A foot this quiet shows its gyro's bias."""
+JUMPED_AFTER = 4
+"""So many samples in a row from the past: the device's clock was set back."""
+UNSURE_AFTER_S = 0.25
+"""A hole in the IMU after which the place needs fixes that agree."""
+UNSURE_SIGMA = 0.3
+"""m per axis: likewise."""
+SURE_AGE_S = 0.3
+SURE_SIGMA = 0.03
+SLOPE_SPAN_NS = 250_000_000
+SLOPE_NOISE = 0.04
+"""m/s: fixes of a standing foot may drift apart by so much through errors of the camera's mount."""
+
+
+class InertialFilter:
+    """One foot's IMU and the fixes that correct it. Times in ns, vectors in the stage."""
+
+    def __init__(self, foot: FootSettings, side: Side, *, floor: bool) -> None:
+        self._foot, self._side, self._use_floor = foot, side, floor
+        self._floor = 0.0
+        self._timeline = Timeline()
+        self._smallest = smallest_variances()
+        self._imu_yaw: float | None = None
+        self.place(foot.imu)
+        self._forget()
+
+    def place(self, imu: Placement) -> None:
+        """The sensor's place on the shoe."""
+        foot = self._foot
+        p, self._imu_q = np.array(imu.p), rot.normalised(np.array(imu.q))
+        self._geometry = np.zeros(9)
+        self._geometry[MARKER_ARM : MARKER_ARM + 3] = rot.unrotate(self._imu_q, np.array(foot.marker.p) - p)
+        self._geometry[ANKLE_ARM : ANKLE_ARM + 3] = rot.unrotate(self._imu_q, -p)
+        self._geometry[FOOT_UP : FOOT_UP + 3] = rot.unrotate(self._imu_q, np.array([0.0, 1.0, 0.0]))
+        self._toe_arm = rot.unrotate(self._imu_q, np.array(foot.toe.p) - p)
+        self._fix_rows = FixRows(foot, self._imu_q)
+
+    def set_floor(self, height: float) -> None:
+        """Floor height in the stage, m."""
+        self._floor = height
+
+    def set_imu_yaw(self, yaw: float) -> None:
+        """Yaw of the device's own frame in the stage, rad: used when the filter begins."""
+        self._imu_yaw = yaw
+
+    def on_imu(self, sample: ImuSample) -> None:
+        """Take a sample. Without rate or attitude, or not finite, or from the past, it is left out."""
+        given = [*sample.acc, *([] if sample.gyro is None else sample.gyro), *([] if sample.q is None else sample.q)]
+        if not all(map(math.isfinite, given)) or (sample.gyro is None and sample.q is None):
+            return
+        timeline = self._timeline
+        if timeline.n == 0:
+            self._begin(sample)
+            return
+        if sample.t <= self._imu_t:
+            self._behind += 1
+            if self._behind < JUMPED_AFTER:
+                return
+            self._jump_to(sample.t)
+        self._behind = 0
+        dt = (sample.t - self._imu_t) * 1e-9
+        if dt > UNSURE_AFTER_S:
+            self.acquired = False
+        t = max(sample.t, int(timeline.t[timeline.n - 1]))
+        i = timeline.append(t)
+        self._fill(timeline.rows[i], sample, dt)
+        row = timeline.rows[i]
+        sigma = stance_sigma(timeline.t, timeline.rows, i, dt, self._memory)
+        if sigma > 0.0:
+            row[ZERO_SIGMA] = math.hypot(sigma, self._drift)
+            row[QUIET_FLAG] = float(self._memory[STATISTIC] < QUIET_STATISTIC and self._drift == 0.0)
+        row[FLOOR] = self._floor + self._foot.ankle_height if self._use_floor else math.nan
+        self._replay(i)
+        follow(self._lock, row, timeline.X[i], self._toe_arm, min(dt, HOLE_S))
+        self._imu_t, self._last = sample.t, row.copy()
+
+    def on_fix(self, fix: OpticalFix) -> Verdict:
+        """Take a fix where it belongs."""
+        reason = implausible(fix)
+        if reason is not None:
+            return reason
+        timeline = self._timeline
+        if timeline.n == 0 or fix.t > self._imu_t + FIX_MEMORY_S * 1e9:
+            return Verdict.UNUSED
+        if fix.t < self._imu_t - OLDEST_S * 1e9:
+            return Verdict.STALE
+        delay = float(np.clip(timeline.X[timeline.n - 1, 16], -0.05, 0.05))
+        t = fix.t + round(delay * 1e9)
+        i = timeline.append(t) if t >= timeline.t[timeline.n - 1] else timeline.insert(t)
+        if i == 0:
+            return Verdict.STALE
+        row = timeline.rows[i]
+        row[KIND] = FIX
+        attitudes = self._fix_rows.fill(row, fix, delay)
+        replay(timeline.t, timeline.rows, timeline.X, timeline.P, i, i + 1, self._geometry, self._smallest)
+        x, P = timeline.X[i], timeline.P[i]
+        ours = self._fix_rows.take_attitude(row, fix, attitudes, x)
+        found = judged(row, x, P, self._rate(i), self._geometry)
+        good = ours and found[0] <= CHI_SQUARE_3 and found[1] <= CHI_SQUARE_1
+        if self.acquired and good:
+            self._candidates.clear()
+            self._accept(i, t)
+            return Verdict.ACCEPTED
+        acquired = self.acquired
+        if ours:
+            turn = None
+            if row[TURN_SIGMA] > 0.0:
+                turn = float(attitude_error(row[MEASURED_Q : MEASURED_Q + 4], x)[1])
+            sigma = math.sqrt(max(row[POINT_COV], row[POINT_COV + 4], row[POINT_COV + 8]))
+            rejected = Rejected(t, row[POINT : POINT + 3].copy(), found[2:5].copy(), turn, sigma)
+            agreed = self._candidates.add(rejected, self._sure(P, t))
+            if agreed is not None:
+                self._restart_from(agreed, fix)
+                return Verdict.ACCEPTED
+        self._replay(i)
+        return Verdict.GATE if acquired or not ours else Verdict.UNCONFIRMED
+
+    def move(self, p: Array, q: Array) -> None:
+        """The stage moved, old to new: everything that is kept goes along."""
+        timeline = self._timeline
+        n = timeline.n
+        if n == 0:
+            return
+        matrix = rot.to_matrix(q)
+        turn = np.eye(NE)
+        for k in (0, 3, 6):
+            turn[k : k + 3, k : k + 3] = matrix
+        timeline.X[:n, 0:3] = timeline.X[:n, 0:3] @ matrix.T + p
+        timeline.X[:n, 3:6] = timeline.X[:n, 3:6] @ matrix.T
+        timeline.X[:n, 6:10] = rot.multiply(q, timeline.X[:n, 6:10])
+        timeline.P[:n] = turn @ timeline.P[:n] @ turn.T
+        # Fixes of the old stage are in the checkpoints already; none of them may be replayed.
+        timeline.restart(int(timeline.t[n - 1]))
+        self._candidates.clear()
+        self._seen.clear()
+        self._lock[:] = 0.0
+
+    def lose(self) -> None:
+        """The stage moved and nobody knows how: the place needs fixes that agree."""
+        self.acquired = False
+        self._candidates.clear()
+        self._seen.clear()
+        if self._timeline.n:
+            last = self._timeline.restart(int(self._timeline.t[self._timeline.n - 1]))
+            self._timeline.P[last, range(3), range(3)] += 1.0
+            self._timeline.P[last, 7, 7] += math.pi**2
+
+    @property
+    def begun(self) -> bool:
+        """Whether there was a sample."""
+        return self._timeline.n > 0
+
+    @property
+    def newest(self) -> int:
+        """Stamp of the newest sample, ns."""
+        return self._imu_t
+
+    @property
+    def state(self) -> tuple[Array, Array]:
+        """State (17,) and covariance (16, 16) after the newest event (foot_filter_kernel)."""
+        i = self._timeline.n - 1
+        return self._timeline.X[i], self._timeline.P[i]
+
+    @property
+    def contact(self) -> bool:
+        """Whether heel or toes stand."""
+        return bool(self._lock[CONTACT])
+
+    def predicted(self, t: int) -> tuple[Array, Array, Array, float]:
+        """Ankle (m), attitude of the foot, velocity (m/s) and SD of the ankle per axis (m) at ``t``, ns."""
+        timeline = self._timeline
+        i = timeline.n - 1
+        dt = min((t - int(timeline.t[i])) * 1e-9, 1.0)
+        out = predicted(self._last, timeline.X[i], timeline.P[i], self._lock, self._geometry, max(dt, -HOLE_S))
+        q = rot.multiply(out[3:7], rot.conjugate(self._imu_q))
+        return out[0:3], q, out[7:10], math.sqrt(out[10] / 3.0)
+
+    def _forget(self) -> None:
+        self._timeline.n = 0
+        self._imu_t, self._behind = 0, 0
+        self._memory, self._lock = np.zeros(2), np.zeros(9)
+        self._last: Array = np.zeros(1)
+        self._q: Array | None = None
+        self.acquired, self._seen_yaw = False, False
+        self._candidates = Candidates()
+        self._seen: deque[tuple[int, Array]] = deque(maxlen=64)
+        self._drift = 0.0
+        self._fix_t: int | None = None
+
+    def _begin(self, sample: ImuSample) -> None:
+        norm = float(np.linalg.norm(sample.acc))
+        if norm < 1.0:
+            return
+        if sample.q is not None and np.any(sample.q != 0.0):
+            q = rot.normalised(sample.q)
+        else:
+            up = sample.acc / norm
+            axis = np.cross(up, [0.0, 1.0, 0.0])
+            sine = float(np.linalg.norm(axis))
+            q = rot.from_rotation_vector(axis / max(sine, 1e-12) * math.atan2(sine, up[1]))
+        if self._imu_yaw is not None and sample.q is not None:
+            q = rot.multiply(rot.from_yaw(self._imu_yaw), q)
+        else:
+            q = rot.multiply(rot.from_yaw(-rot.yaw_of(rot.multiply(q, rot.conjugate(self._imu_q)))), q)
+        timeline = self._timeline
+        i = timeline.append(sample.t)
+        self._fill(timeline.rows[i], sample, 0.0)
+        ankle = np.array([FEET_APART[self._side], self._floor + self._foot.ankle_height, 0.0])
+        x, P = np.zeros(NX), np.zeros((NE, NE))
+        x[0:3] = ankle - rot.rotate(q, self._geometry[ANKLE_ARM : ANKLE_ARM + 3])
+        x[6:10] = q
+        tilt = 0.03 if sample.gyro is None else 0.05
+        sigmas = [0.03] * 3 + [0.1] * 3 + [tilt, 0.02, tilt] + [0.05] * 3
+        sigmas += [1e-7 if sample.gyro is None else 0.01] * 3 + [0.005]
+        P[np.arange(NE), np.arange(NE)] = np.square(sigmas)
+        timeline.X[i], timeline.P[i] = x, P
+        self._imu_t, self._last = sample.t, timeline.rows[i].copy()
+
+    def _fill(self, row: Array, sample: ImuSample, dt: float) -> None:
+        row[KIND] = IMU
+        row[ACC : ACC + 3] = sample.acc
+        largest = float(np.max(np.abs(sample.acc)))
+        row[CLIPPED] = float(any(0.985 < largest / scale < 1.02 for scale in FULL_SCALES))
+        q = None
+        if sample.q is not None and np.any(sample.q != 0.0):
+            q = rot.normalised(sample.q)
+            row[UP : UP + 3] = rot.unrotate(q, np.array([0.0, 1.0, 0.0]))
+        if sample.gyro is not None:
+            row[GYRO : GYRO + 3] = sample.gyro
+        else:
+            row[MEAN_RATE] = 1.0
+            if q is not None and self._q is not None and dt > 0.0:
+                rate = rot.to_rotation_vector(rot.multiply(rot.conjugate(self._q), q)) / dt
+                if float(rate @ rate) < MOST_RATE**2:
+                    row[GYRO : GYRO + 3] = rate
+        if q is not None:
+            self._q = q
+
+    def _replay(self, start: int) -> None:
+        timeline = self._timeline
+        replay(timeline.t, timeline.rows, timeline.X, timeline.P, start, timeline.n, self._geometry, self._smallest)
+
+    def _rate(self, i: int) -> Array:
+        rows = self._timeline.rows
+        j = i + 1 if i + 1 < self._timeline.n and rows[i + 1, KIND] == IMU else i - 1
+        x = self._timeline.X[i]
+        return rows[j, GYRO : GYRO + 3] - x[13:16] if rows[j, KIND] == IMU else self._last[GYRO : GYRO + 3] - x[13:16]
+
+    def _accept(self, i: int, t: int) -> None:
+        timeline = self._timeline
+        row = timeline.rows[i]
+        row[ACCEPTED] = 1.0
+        self._fix_t = t
+        self._see(t, row[POINT : POINT + 3].copy())
+        if self._drift > 0.0:
+            for j in range(i + 1, timeline.n):
+                if timeline.rows[j, ZERO_SIGMA] > 0.0:
+                    timeline.rows[j, ZERO_SIGMA] = max(timeline.rows[j, ZERO_SIGMA], self._drift)
+        self._replay(i)
+
+    def _see(self, t: int, point: Array) -> None:
+        """Whether accepted fixes of the last quarter of a second move: then the foot does not stand, however quiet."""
+        seen = self._seen
+        seen.append((t, point))
+        while seen and t - seen[0][0] > SLOPE_SPAN_NS:
+            seen.popleft()
+        self._drift = 0.0
+        if len(seen) >= 6 and t - seen[0][0] > 0.5 * SLOPE_SPAN_NS:
+            times = np.array([(s[0] - t) * 1e-9 for s in seen])
+            times -= times.mean()
+            points = np.array([s[1] for s in seen])
+            slope = times @ (points - points.mean(axis=0)) / (times @ times)
+            speed = float(np.linalg.norm(slope))
+            if speed > SLOPE_NOISE:
+                self._drift = speed
+
+    def _sure(self, P: Array, t: int) -> bool:
+        if not self.acquired or self._fix_t is None or (t - self._fix_t) * 1e-9 > 3.0 * SURE_AGE_S:
+            return False
+        return math.sqrt(max(P[0, 0], P[1, 1], P[2, 2])) < SURE_SIGMA
+
+    def _restart_from(self, agreed: list[Rejected], fix: OpticalFix) -> None:
+        """Begin anew at the oldest of the fixes that agree, and take them all."""
+        timeline = self._timeline
+        first, last = agreed[0], agreed[-1]
+        i = timeline.insert(first.t - 1)
+        if i == 0:
+            self._replay(1)
+            return
+        row = timeline.rows[i]
+        row[KIND] = RESET
+        row[POINT : POINT + 3] = first.point
+        span = (last.t - first.t) * 1e-9
+        row[SPEED : SPEED + 3] = (last.point - first.point) / span
+        row[POINT_SIGMA] = 0.03
+        row[SPEED_SIGMA] = 0.5 + 3.0 * first.sigma / span
+        chosen = {k.t for k in agreed}
+        turns = [k.turn for k in agreed if k.turn is not None]
+        x = timeline.X[i - 1]
+        if turns:
+            row[MEASURED_Q : MEASURED_Q + 4] = rot.multiply(rot.from_yaw(turns[len(turns) // 2]), x[6:10])
+            row[TURN_SIGMA], row[YAW_SIGMA] = 1.0, 0.1
+            self._seen_yaw = True
+        elif not self._seen_yaw:
+            # Nothing says where the toes point: mostly where the head looks.
+            foot_q = rot.multiply(x[6:10], rot.conjugate(self._imu_q))
+            turn = float(rot.yaw_of(fix.head.q) - rot.yaw_of(foot_q))
+            row[MEASURED_Q : MEASURED_Q + 4] = rot.multiply(rot.from_yaw(turn), x[6:10])
+            row[TURN_SIGMA], row[YAW_SIGMA] = 1.0, 0.6
+        for j in range(i, timeline.n):
+            if timeline.rows[j, KIND] == FIX and int(timeline.t[j]) in chosen:
+                timeline.rows[j, ACCEPTED] = 1.0
+        self._replay(i)
+        self.acquired = True
+        self._fix_t = last.t
+        self._seen.clear()
+        self._drift = 0.0
+        self._lock[:] = 0.0
+
+    def _jump_to(self, t: int) -> None:
+        """The device's clock was set back: go on from there, unsure."""
+        self._timeline.restart(t - 1)
+        self._imu_t = t - 1
+        self._timeline.P[0, range(3), range(3)] += 0.1**2
+        self._timeline.P[0, range(3, 6), range(3, 6)] += 1.0
+        self._memory[:] = 0.0
+        self.acquired = False
+        self._candidates.clear()
+        self._seen.clear()
+        self._q = None

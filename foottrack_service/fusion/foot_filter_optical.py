@@ -1,0 +1,210 @@
+"""What a fix is worth before it is fused: plausibility, the tag's two attitudes, and the way back when we are lost."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from foottrack_service import rotations as rot
+from foottrack_service.config import FootSettings
+from foottrack_service.fusion.compiled import compiled
+from foottrack_service.fusion.foot_filter_events import (
+    MEASURED_Q,
+    NORMAL,
+    PLACED_DELAY,
+    POINT,
+    POINT_COV,
+    TURN_SIGMA,
+)
+from foottrack_service.fusion.foot_filter_kernel import NE, invert3
+from foottrack_service.fusion.foot_filter_replay import MARKER_ARM, attitude_error, point_model
+from foottrack_service.fusion.interface import OpticalFix, Verdict
+from foottrack_service.rotations import Array
+
+CHI_SQUARE_3 = 16.3
+"""99.9 % of good fixes are below (3 degrees of freedom)."""
+CHI_SQUARE_1 = 16.3
+SIZE_RATIO = (0.8, 1.25)
+LEAST_EDGE_PX = 2.0
+OLDEST_S = 0.8
+HEAD_NOISE = 0.0015
+"""m per axis: what the head pose adds to the picture's own noise."""
+HEAD_TURN_NOISE = 0.0007
+"""rad: likewise, times the distance."""
+LEAST_TURN_SIGMA = 0.012
+"""rad: a printed tag is not glued on straighter."""
+TURN_PER_METRE = 25.0
+"""rad/m: a tag's turn in the picture is known to its corner noise over its size (6 cm)."""
+TILT_USABLE = 0.45
+"""rad: a tag's attitude that leans more against gravity is not used."""
+TILT_IMPOSSIBLE = 0.9
+"""rad: and beyond this it is not our tag, wherever it is."""
+
+
+def implausible(fix: OpticalFix) -> Verdict | None:
+    """Why a fix is not looked at any further; None when it may be good."""
+    numbers = [*fix.p, *fix.cov.ravel(), *fix.head.p, *fix.head.q]
+    if not all(map(math.isfinite, numbers)) or min(fix.cov[0, 0], fix.cov[1, 1], fix.cov[2, 2]) < 0.0:
+        return Verdict.INVALID
+    if fix.edge_px < LEAST_EDGE_PX:
+        return Verdict.BORDER
+    if fix.size_ratio is not None and not SIZE_RATIO[0] <= fix.size_ratio <= SIZE_RATIO[1]:
+        return Verdict.SIZE
+    return None
+
+
+class FixRows:
+    """Turns fixes into the timeline's rows for one shoe."""
+
+    def __init__(self, foot: FootSettings, imu_q: Array) -> None:
+        self._target_to_sensor = rot.multiply(rot.conjugate(imu_q), np.array(foot.marker.q))
+
+    def fill(self, row: Array, fix: OpticalFix, delay: float) -> list[Array]:
+        """Write place and noise into ``row``; returns the sensor's attitudes that the tag allows, best first."""
+        matrix = rot.to_matrix(fix.head.q)
+        row[POINT : POINT + 3] = fix.head.p + matrix @ fix.p
+        distance2 = float(fix.p @ fix.p)
+        noise = HEAD_NOISE**2 + HEAD_TURN_NOISE**2 * distance2
+        row[POINT_COV : POINT_COV + 9] = (matrix @ fix.cov @ matrix.T + noise * np.eye(3)).ravel()
+        row[PLACED_DELAY] = delay
+        found = []
+        for q in (fix.q, fix.q_alt):
+            if q is not None and np.isfinite(q).all() and np.any(q != 0.0):
+                target = rot.multiply(fix.head.q, rot.normalised(q))
+                found.append(rot.multiply(target, rot.conjugate(self._target_to_sensor)))
+        return found
+
+    def take_attitude(self, row: Array, fix: OpticalFix, attitudes: list[Array], x: Array) -> bool:
+        """Let gravity, as the state ``x`` knows it, choose among the tag's attitudes.
+
+        False: none of them can be this foot's. One that leans a little too much is just not used.
+        """
+        if not attitudes:
+            return True
+        leans = []
+        for q in attitudes:
+            error = attitude_error(q, x)
+            leans.append(math.hypot(error[0], error[2]))
+        best = int(np.argmin(leans))
+        if leans[best] > TILT_IMPOSSIBLE:
+            return False
+        if leans[best] <= TILT_USABLE:
+            q = attitudes[best]
+            row[MEASURED_Q : MEASURED_Q + 4] = q
+            normal = rot.rotate(rot.multiply(q, self._target_to_sensor), np.array([0.0, 0.0, 1.0]))
+            row[NORMAL : NORMAL + 3] = normal
+            across = math.sqrt(max(0.0, float(np.linalg.eigvalsh(fix.cov)[0])))
+            row[TURN_SIGMA] = math.hypot(LEAST_TURN_SIGMA, TURN_PER_METRE * across)
+        return True
+
+
+@compiled
+def judged(row: Array, x: Array, P: Array, rate: Array, geometry: Array) -> Array:
+    """A fix against the state at its instant.
+
+    Shape (5,): squared Mahalanobis distances of its place and of its turn, and the place's residual (3, m).
+    """
+    out = np.zeros(5)
+    h, H = np.empty(3), np.empty((3, NE))
+    point_model(x, geometry[MARKER_ARM : MARKER_ARM + 3], rate, x[16] - row[PLACED_DELAY], h, H)
+    S = H @ P @ H.T + row[POINT_COV : POINT_COV + 9].copy().reshape(3, 3)
+    inverse = np.empty((3, 3))
+    residual = row[POINT : POINT + 3] - h
+    out[0] = residual @ inverse @ residual if invert3(S, inverse) else np.inf
+    out[2:5] = residual
+    if row[TURN_SIGMA] > 0.0:
+        error = attitude_error(row[MEASURED_Q : MEASURED_Q + 4], x)
+        n = row[NORMAL : NORMAL + 3].copy()
+        variance = n @ np.ascontiguousarray(P[6:9, 6:9]) @ n + row[TURN_SIGMA] ** 2
+        out[1] = (n @ error) ** 2 / variance
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Rejected:
+    """A fix that was not believed, and by how much it disagreed."""
+
+    t: int
+    point: Array
+    residual: Array
+    turn: float | None
+    """Yaw by which the tag's attitude differs from ours, rad."""
+    sigma: float
+
+
+SPAN_S = 0.12
+"""Fixes that agree lie at most so far apart, one from the next."""
+FEW = 3
+"""So many that agree start a foot whose place is unknown."""
+SURE_SPAN_S = 0.22
+"""A foot that knows its place is overruled only by fixes that agree for so long, with none accepted between."""
+SLACK = 0.012
+"""m: fixes that agree do so within this and three sigma, along a straight drift."""
+FASTEST = 4.0
+"""m/s of drift, when our velocity is wrong too."""
+SURE_FASTEST = 0.3
+"""m/s: a foot that knows its velocity is not overruled by something that does not move with it."""
+TURN_SLACK = 0.35
+"""rad."""
+
+
+class Candidates:
+    """Fixes that were not believed, until enough of them agree that it is us who are wrong."""
+
+    def __init__(self) -> None:
+        self._kept: deque[Rejected] = deque(maxlen=64)
+
+    def clear(self) -> None:
+        """A fix was accepted."""
+        self._kept.clear()
+
+    def add(self, rejected: Rejected, sure: bool) -> list[Rejected] | None:
+        """The fixes that agree with this newest one, oldest first, when they suffice; else None.
+
+        ``sure``: the foot knows its place and speed well.
+        """
+        if self._kept and not 0 < rejected.t - self._kept[-1].t <= SPAN_S * 1e9:
+            self._kept.clear()
+        self._kept.append(rejected)
+        recent = [k for k in self._kept if rejected.t - k.t <= (2.0 * SURE_SPAN_S if sure else SPAN_S) * 1e9]
+        agreeing = _agreeing(recent, SURE_FASTEST if sure else FASTEST)
+        if len(agreeing) < FEW or (sure and rejected.t - agreeing[0].t < SURE_SPAN_S * 1e9):
+            return None
+        self._kept.clear()
+        # Only the last few start the filter anew: the older ones belong to a time when it was still confused.
+        return agreeing[-2 * FEW :]
+
+
+def _agreeing(kept: list[Rejected], fastest: float) -> list[Rejected]:
+    """The longest unbroken end of ``kept`` whose residuals lie on one slow straight drift."""
+    newest = kept[-1]
+    found: list[Rejected] = [newest]
+    for older in reversed(kept[:-1]):
+        trial = [older, *found]
+        if not _on_a_line(trial, fastest):
+            break
+        found = trial
+    return found
+
+
+def _on_a_line(kept: list[Rejected], fastest: float) -> bool:
+    t = np.array([(k.t - kept[-1].t) * 1e-9 for k in kept])
+    residuals = np.array([k.residual for k in kept])
+    slope = np.zeros(3)
+    if len(kept) > 2:
+        centred = t - t.mean()
+        slope = centred @ residuals / (centred @ centred)
+    else:
+        slope = (residuals[-1] - residuals[0]) / (t[-1] - t[0])
+    speed = float(np.linalg.norm(slope))
+    sigma = max(k.sigma for k in kept)
+    if speed * (t[-1] - t[0]) > fastest * (t[-1] - t[0]) + SLACK + 3.0 * sigma:
+        return False
+    off = residuals - residuals.mean(axis=0) - np.outer(t - t.mean(), slope)
+    if float(np.max(np.linalg.norm(off, axis=1))) > SLACK + 3.0 * sigma:
+        return False
+    turns = [k.turn for k in kept if k.turn is not None]
+    return len(turns) < 2 or all(abs(math.remainder(turn - turns[-1], math.tau)) < TURN_SLACK for turn in turns)

@@ -1,0 +1,127 @@
+"""What leaves the filter: the ankle predicted to a stamp, and the stance lock, compiled.
+
+A standing foot is held by its *toe*, since the heel rises first; when it leaves, what the lock had held back fades
+within 50 ms. Nothing is averaged: an average of 0.2 costs 9 mm and 39 ms on a walk (simulated).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from foottrack_service.fusion.compiled import compiled
+from foottrack_service.fusion.foot_filter_events import ACC, CLIPPED, GYRO, ZERO_SIGMA
+from foottrack_service.fusion.foot_filter_kernel import GRAVITY, rotation, turn_body
+from foottrack_service.fusion.foot_filter_replay import ANKLE_ARM, turned
+from foottrack_service.rotations import Array
+
+LONGEST_HOLD_S = 0.02
+"""The last sample's acceleration and turning hold for so long; after that the foot coasts at its speed."""
+COASTING_DECAY_S = 0.15
+"""A coasting foot slows down: it is more likely to land than to fly on."""
+COASTING_ACCELERATION = 15.0
+"""m/s^2 SD of a foot that nobody measures."""
+
+# lock, shape (9,)
+LOCKED, HELD, OFFSET, SINCE, CONTACT = 0, 1, 4, 7, 8
+TOE_SPEED = 0.15
+"""m/s: a toe that is slower and has not risen still stands when the heel leaves."""
+TOE_RISE = 0.012
+"""m."""
+FASTEST_FOLLOW_S, SLOWEST_FOLLOW_S = 0.1, 1.0
+"""How fast the lock follows the filter: landing is corrected soon, a foot that has stood for long hardly moves."""
+LARGEST_HOLD = 0.02
+"""m: who disagrees by more is not held."""
+RELEASE_S = 0.017
+"""Time constant of the release: 5 % are left after 50 ms."""
+
+
+@compiled
+def follow(lock: Array, row: Array, x: Array, toe_arm: Array, dt: float) -> None:
+    """Carry the stance lock over one sample, dt in s. ``lock[OFFSET]`` is what the output is moved by."""
+    R = np.empty((3, 3))
+    rotation(x[6:10], R)
+    arm = turned(R, toe_arm)
+    spin = np.empty(3)
+    w0, w1, w2 = row[GYRO] - x[13], row[GYRO + 1] - x[14], row[GYRO + 2] - x[15]
+    spin[0] = w1 * toe_arm[2] - w2 * toe_arm[1]
+    spin[1] = w2 * toe_arm[0] - w0 * toe_arm[2]
+    spin[2] = w0 * toe_arm[1] - w1 * toe_arm[0]
+    speed = turned(R, spin)
+    toe = x[0:3] + arm
+    s2 = 0.0
+    gap2 = 0.0
+    for k in range(3):
+        s2 += (x[3 + k] + speed[k]) ** 2
+        gap2 += (toe[k] - lock[HELD + k]) ** 2
+    pivots = lock[LOCKED] == 1.0 and s2 < TOE_SPEED**2 and toe[1] - lock[HELD + 1] < TOE_RISE
+    stands = row[ZERO_SIGMA] > 0.0 or pivots
+    lock[CONTACT] = 1.0 if stands else 0.0
+    if not stands:
+        lock[LOCKED] = 0.0
+        fade = math.exp(-dt / RELEASE_S)
+        for k in range(3):
+            lock[OFFSET + k] *= fade
+        return
+    if lock[LOCKED] == 0.0 or gap2 > LARGEST_HOLD**2:
+        keep = 1.0 if gap2 <= LARGEST_HOLD**2 or lock[LOCKED] == 0.0 else 0.0
+        for k in range(3):
+            lock[HELD + k] = toe[k] + keep * lock[OFFSET + k]
+        lock[LOCKED] = 1.0
+        lock[SINCE] = 0.0
+    lock[SINCE] += dt
+    share = min(1.0, dt / min(max(lock[SINCE], FASTEST_FOLLOW_S), SLOWEST_FOLLOW_S))
+    for k in range(3):
+        lock[HELD + k] += share * (toe[k] - lock[HELD + k])
+        lock[OFFSET + k] = lock[HELD + k] - toe[k]
+
+
+@compiled
+def predicted(row: Array, x: Array, P: Array, lock: Array, geometry: Array, dt: float) -> Array:
+    """The foot dt s after the newest event.
+
+    Shape (11,): ankle (3, m), sensor's attitude (4), ankle's velocity (3, m/s), variance of the ankle summed over the
+    three axes (m^2). ``row`` is the newest IMU sample.
+    """
+    out = np.empty(11)
+    q = x[6:10].copy()
+    hold = min(max(dt, -LONGEST_HOLD_S), LONGEST_HOLD_S)
+    clipped = row[CLIPPED] == 1.0
+    w = np.empty(3)
+    f = np.empty(3)
+    for k in range(3):
+        w[k] = row[GYRO + k] - x[13 + k]
+        f[k] = row[ACC + k] - x[10 + k]
+    R = np.empty((3, 3))
+    turn_body(q, 0.5 * hold * w[0], 0.5 * hold * w[1], 0.5 * hold * w[2])
+    rotation(q, R)
+    a = turned(R, f)
+    a[1] -= GRAVITY
+    if clipped:
+        a[:] = 0.0
+    turn_body(q, 0.5 * hold * w[0], 0.5 * hold * w[1], 0.5 * hold * w[2])
+    rotation(q, R)
+    arm = geometry[ANKLE_ARM : ANKLE_ARM + 3]
+    r = turned(R, arm)
+    coast = dt - hold
+    slow = math.exp(-max(coast, 0.0) / COASTING_DECAY_S)
+    spin = np.empty(3)
+    spin[0] = w[1] * arm[2] - w[2] * arm[1]
+    spin[1] = w[2] * arm[0] - w[0] * arm[2]
+    spin[2] = w[0] * arm[1] - w[1] * arm[0]
+    s = turned(R, spin)
+    free = 0.5 * COASTING_ACCELERATION * coast * coast if coast > 0.0 else 0.0
+    still = lock[CONTACT] == 1.0
+    total = 3.0 * free * free * (0.01 if still else 1.0)
+    lever = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
+    for k in range(3):
+        v = x[3 + k] + a[k] * hold
+        out[k] = x[k] + x[3 + k] * hold + 0.5 * a[k] * hold * hold + r[k] + lock[OFFSET + k]
+        out[k] += v * (COASTING_DECAY_S * (1.0 - slow) if coast > 0.0 else coast)
+        out[3 + k] = q[k]
+        out[7 + k] = (v + s[k]) * slow
+        total += P[k, k] + 2.0 * dt * P[k, 3 + k] + dt * dt * P[3 + k, 3 + k] + lever * P[6 + k, 6 + k]
+    out[6] = q[3]
+    out[10] = max(total, 0.0)
+    return out

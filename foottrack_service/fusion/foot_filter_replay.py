@@ -1,0 +1,311 @@
+"""The filter over a timeline: from one checkpoint through the events after it, compiled.
+
+One function serves a new sample (one event) and a late fix (all events since it), so there is no second way.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from foottrack_service.fusion.compiled import compiled
+from foottrack_service.fusion.foot_filter_events import (
+    ACC,
+    ACCEPTED,
+    CLIPPED,
+    FLOOR,
+    GYRO,
+    IMU,
+    KIND,
+    MEAN_RATE,
+    MEASURED_Q,
+    NORMAL,
+    PLACED_DELAY,
+    POINT,
+    POINT_COV,
+    POINT_SIGMA,
+    QUIET_FLAG,
+    RESET,
+    SPEED,
+    SPEED_SIGMA,
+    TILT_SIGMA,
+    TURN_SIGMA,
+    UP,
+    YAW_SIGMA,
+    ZERO_SIGMA,
+)
+from foottrack_service.fusion.foot_filter_kernel import (
+    GRAVITY,
+    NE,
+    floor_covariance,
+    propagate,
+    rotation,
+    turn_stage,
+    update1,
+    update3,
+)
+from foottrack_service.rotations import Array
+
+# geometry, shape (9,), sensor frame
+MARKER_ARM, ANKLE_ARM, FOOT_UP = 0, 3, 6
+
+HOLE_S = 0.1
+"""A longer silence of the IMU is not integrated across."""
+HOLE_SPEED = 1.5
+"""m/s SD: what a foot does meanwhile."""
+HOLE_RATE = 1.0
+"""rad/s SD of a foot whose IMU has no attitude of its own."""
+LONGEST_HOLE_S = 1.0
+ZERO_GATE = 30.0
+"""A stance never overrules a velocity that is clearly known: chi-square, 3 degrees of freedom."""
+FLOOR_GATE = 12.0
+FLOOR_SIGMA = 0.005
+"""m, of a standing ankle's height."""
+FLOOR_LEAN = 0.9
+"""Cosine: a foot that leans more stands on its heel or toes, and the ankle's height says nothing."""
+BIAS_SIGMA = 0.01
+"""rad/s per 10 ms: how little a quiet foot turns."""
+UP_SIGMA = 0.05
+"""rad: the device's own tilt, the same error for about a second."""
+LEVEL_SIGMA = 0.05
+"""rad: the tilt of the specific force of a foot at rest."""
+LEVEL_BELOW = 0.05
+"""rad: who knows the tilt better than this does not ask the specific force."""
+
+
+def smallest_variances() -> Array:
+    """Below which no variance falls, shape (16,): of p, v, attitude, both biases, the time offset."""
+    return np.array([1e-8] * 3 + [1e-8] * 3 + [1e-8] * 3 + [1e-8] * 3 + [1e-14] * 3 + [1e-8])
+
+
+@compiled
+def replay(t: Array, rows: Array, X: Array, P: Array, start: int, end: int, geometry: Array, smallest: Array) -> None:
+    """States and covariances after the events ``start`` .. ``end`` - 1 from the one before. ``start`` is at least 1."""
+    for i in range(start, end):
+        X[i] = X[i - 1]
+        P[i] = P[i - 1]
+        dt = (t[i] - t[i - 1]) * 1e-9
+        if dt > 0.0:
+            _advance(rows, X[i], P[i], i, end, dt)
+        kind = rows[i, KIND]
+        if kind == IMU:
+            _inertial_updates(rows[i], X[i], P[i], min(dt, HOLE_S), geometry)
+        elif kind == RESET:
+            _reset(rows[i], X[i], P[i], geometry)
+        elif rows[i, ACCEPTED] == 1.0:
+            fix_updates(rows[i], X[i], P[i], _rate(rows, X[i], i, end), geometry)
+        floor_covariance(P[i], smallest)
+
+
+@compiled
+def turned(R: Array, v: Array) -> Array:
+    """R v, shape (3,)."""
+    out = np.empty(3)
+    for i in range(3):
+        out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
+    return out
+
+
+@compiled
+def point_model(x: Array, arm: Array, rate: Array, delay: float, h: Array, H: Array) -> None:
+    """A point of the foot at ``arm``, sensor frame, m: its place into h (3,), the Jacobian into H (3, 16).
+
+    ``rate`` is the sensor's turning, rad/s; ``delay`` how much later than the state the point was seen, s.
+    """
+    R = np.empty((3, 3))
+    rotation(x[6:10], R)
+    r = turned(R, arm)
+    spin = np.empty(3)
+    spin[0] = rate[1] * arm[2] - rate[2] * arm[1]
+    spin[1] = rate[2] * arm[0] - rate[0] * arm[2]
+    spin[2] = rate[0] * arm[1] - rate[1] * arm[0]
+    s = turned(R, spin)
+    H[:] = 0.0
+    for i in range(3):
+        speed = x[3 + i] + s[i]
+        h[i] = x[i] + r[i] + speed * delay
+        H[i, i] = 1.0
+        H[i, 3 + i] = delay
+        H[i, 15] = speed
+    H[0, 7], H[0, 8] = r[2], -r[1]
+    H[1, 6], H[1, 8] = -r[2], r[0]
+    H[2, 6], H[2, 7] = r[1], -r[0]
+
+
+@compiled
+def attitude_error(q: Array, x: Array) -> Array:
+    """The small turn in the stage from the state's attitude to q, rotation vector, rad, shape (3,)."""
+    a, b = q, x[6:10]
+    ex = -a[3] * b[0] + a[0] * b[3] - a[1] * b[2] + a[2] * b[1]
+    ey = -a[3] * b[1] + a[0] * b[2] + a[1] * b[3] - a[2] * b[0]
+    ez = -a[3] * b[2] - a[0] * b[1] + a[1] * b[0] + a[2] * b[3]
+    ew = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    if ew < 0.0:
+        ex, ey, ez, ew = -ex, -ey, -ez, -ew
+    sine = math.sqrt(ex * ex + ey * ey + ez * ez)
+    scale = 2.0 if sine < 1e-9 else 2.0 * math.atan2(sine, ew) / sine
+    out = np.empty(3)
+    out[0], out[1], out[2] = scale * ex, scale * ey, scale * ez
+    return out
+
+
+@compiled
+def fix_updates(row: Array, x: Array, P: Array, rate: Array, geometry: Array) -> None:
+    """An accepted fix: the target's place and, where it has one, its turn about the target's face."""
+    h, H = np.empty(3), np.empty((3, NE))
+    point_model(x, geometry[MARKER_ARM : MARKER_ARM + 3], rate, x[16] - row[PLACED_DELAY], h, H)
+    S = row[POINT_COV : POINT_COV + 9].copy().reshape(3, 3)
+    update3(x, P, H, row[POINT : POINT + 3] - h, S, np.inf)
+    if row[TURN_SIGMA] > 0.0:
+        error = attitude_error(row[MEASURED_Q : MEASURED_Q + 4], x)
+        H1 = np.zeros(NE)
+        innovation = 0.0
+        for i in range(3):
+            H1[6 + i] = row[NORMAL + i]
+            innovation += row[NORMAL + i] * error[i]
+        update1(x, P, H1, innovation, row[TURN_SIGMA] ** 2, np.inf)
+
+
+@compiled
+def _neighbour(rows: Array, i: int, step: int, end: int) -> int:
+    j = i + step
+    while 0 <= j < end:
+        if rows[j, KIND] == IMU:
+            return j
+        j += step
+    return -1
+
+
+@compiled
+def _rate(rows: Array, x: Array, i: int, end: int) -> Array:
+    """The turning at event i, rad/s, sensor frame, of the IMU row next to it."""
+    j = _neighbour(rows, i, 1, end)
+    if j < 0:
+        j = _neighbour(rows, i, -1, end)
+    rate = np.zeros(3)
+    if j >= 0:
+        for k in range(3):
+            rate[k] = rows[j, GYRO + k] - x[13 + k]
+    return rate
+
+
+@compiled
+def _advance(rows: Array, x: Array, P: Array, i: int, end: int, dt: float) -> None:
+    """Carry the state over the dt before event i."""
+    before = _neighbour(rows, i, -1, end)
+    after = i if rows[i, KIND] == IMU else _neighbour(rows, i, 1, end)
+    if after < 0:
+        after = before
+    if before < 0:
+        before = after
+    if before < 0:
+        return
+    acc, gyro = np.empty(3), np.empty(3)
+    step = 0.0
+    held = after if rows[after, MEAN_RATE] == 1.0 else before
+    for k in range(3):
+        a0, a1 = rows[before, ACC + k], rows[after, ACC + k]
+        acc[k] = 0.5 * (a0 + a1)
+        gyro[k] = 0.5 * (rows[held, GYRO + k] + rows[after, GYRO + k])
+        step += (a1 - a0) * (a1 - a0)
+    if dt <= HOLE_S:
+        clipped = rows[before, CLIPPED] == 1.0 or rows[after, CLIPPED] == 1.0
+        propagate(x, P, acc, gyro, math.sqrt(step), clipped, dt)
+        return
+    own_attitude = rows[after, MEAN_RATE] == 1.0
+    if own_attitude:
+        spin = np.empty((3, 3))
+        rotation(x[6:10], spin)
+        turn = turned(spin, gyro)
+        turn_stage(x[6:10], turn[0] * dt, turn[1] * dt, turn[2] * dt)
+    hole = min(dt, LONGEST_HOLE_S)
+    for k in range(3):
+        x[3 + k] = 0.0
+        for j in range(NE):
+            P[3 + k, j] = 0.0
+            P[j, 3 + k] = 0.0
+        P[3 + k, 3 + k] = HOLE_SPEED**2
+        P[k, k] += (HOLE_SPEED * hole) ** 2
+        P[6 + k, 6 + k] += (0.02 if own_attitude else HOLE_RATE * hole) ** 2
+
+
+@compiled
+def _inertial_updates(row: Array, x: Array, P: Array, dt: float, geometry: Array) -> None:
+    """What a sample says beyond its motion: zero velocity, the floor, the gyro's bias, up."""
+    if dt <= 0.0:
+        return
+    h = np.zeros(NE)
+    sigma = row[ZERO_SIGMA]
+    if sigma > 0.0:
+        H = np.zeros((3, NE))
+        S = np.zeros((3, 3))
+        zero = np.empty(3)
+        for k in range(3):
+            H[k, 3 + k] = 1.0
+            S[k, k] = sigma * sigma * 0.01 / dt
+            zero[k] = -x[3 + k]
+        held = update3(x, P, H, zero, S, ZERO_GATE) <= ZERO_GATE
+        if held and row[FLOOR] == row[FLOOR]:
+            R = np.empty((3, 3))
+            rotation(x[6:10], R)
+            up = turned(R, geometry[FOOT_UP : FOOT_UP + 3])
+            if up[1] > FLOOR_LEAN:
+                r = turned(R, geometry[ANKLE_ARM : ANKLE_ARM + 3])
+                h[:] = 0.0
+                h[1], h[6], h[8] = 1.0, -r[2], r[0]
+                noise = (FLOOR_SIGMA + sigma) ** 2 * 0.1 / dt
+                update1(x, P, h, row[FLOOR] - x[1] - r[1], noise, FLOOR_GATE)
+        if row[QUIET_FLAG] == 1.0 and row[MEAN_RATE] == 0.0:
+            for k in range(3):
+                h[:] = 0.0
+                h[12 + k] = 1.0
+                update1(x, P, h, row[GYRO + k] - x[13 + k], BIAS_SIGMA**2 * 0.01 / dt, 9.0)
+        if max(P[6, 6], P[8, 8]) > LEVEL_BELOW**2:
+            _level(row[ACC : ACC + 3] / GRAVITY, LEVEL_SIGMA**2 * 0.1 / dt, x, P)
+    if row[UP] != 0.0 or row[UP + 1] != 0.0 or row[UP + 2] != 0.0:
+        _level(row[UP : UP + 3], UP_SIGMA**2 * 1.0 / dt, x, P)
+
+
+@compiled
+def _level(up: Array, variance: float, x: Array, P: Array) -> None:
+    """``up``, sensor frame, is the stage's up: two components of the attitude error, never the yaw."""
+    R = np.empty((3, 3))
+    h = np.zeros(NE)
+    rotation(x[6:10], R)
+    seen = turned(R, up)
+    h[6] = 1.0
+    update1(x, P, h, -seen[2], variance, np.inf)
+    rotation(x[6:10], R)
+    seen = turned(R, up)
+    h[6], h[8] = 0.0, 1.0
+    update1(x, P, h, seen[0], variance, np.inf)
+
+
+@compiled
+def _reset(row: Array, x: Array, P: Array, geometry: Array) -> None:
+    """A new start of place, speed and yaw; tilt and biases stay."""
+    if row[TURN_SIGMA] > 0.0:
+        # The twist about up of the turn from the state's attitude to the measured one.
+        a, b = row[MEASURED_Q : MEASURED_Q + 4], x[6:10]
+        y = -a[3] * b[1] + a[0] * b[2] + a[1] * b[3] - a[2] * b[0]
+        w = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+        turn_stage(x[6:10], 0.0, 2.0 * math.atan2(y, w), 0.0)
+    R = np.empty((3, 3))
+    rotation(x[6:10], R)
+    r = turned(R, geometry[MARKER_ARM : MARKER_ARM + 3])
+    for k in range(3):
+        x[k] = row[POINT + k] - r[k]
+        x[3 + k] = row[SPEED + k]
+    for k in range(6):
+        for j in range(NE):
+            P[k, j] = 0.0
+            P[j, k] = 0.0
+        P[k, k] = row[POINT_SIGMA] ** 2 if k < 3 else row[SPEED_SIGMA] ** 2
+    if row[YAW_SIGMA] > 0.0:
+        for j in range(NE):
+            P[7, j] = 0.0
+            P[j, 7] = 0.0
+        P[7, 7] = row[YAW_SIGMA] ** 2
+    P[6, 6] += row[TILT_SIGMA] ** 2
+    P[8, 8] += row[TILT_SIGMA] ** 2
