@@ -10,7 +10,6 @@ from typing import Any
 
 from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
-from pydantic_core import core_schema
 
 from foottrack_protocol.envelope import PROTOCOL_MAJOR
 from foottrack_protocol.topics import Topic
@@ -80,5 +79,5 @@ class _Untitled(GenerateJsonSchema):
         tag = inner["type"] == "default" and inner["schema"]["type"] == "literal"
         return tag or super().field_is_required(field, total)
 
-    def bytes_schema(self, schema: core_schema.BytesSchema) -> JsonSchemaValue:
+    def bytes_schema(self, schema: Any) -> JsonSchemaValue:
         return {"type": "string"}
