@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import math
-import time
 
 import numpy as np
 
@@ -90,11 +89,10 @@ class ErrorStateFilter:
 
 
 def warm_up() -> None:
-    """Compile the kernels, or read them from the cache, before the first sample needs them; says so when it is slow."""
-    begun = time.perf_counter()
+    """Compile the kernels, or read them from the cache, before the first sample needs them, and say so."""
     _log.info("loading the foot filter (the first start on a machine compiles it: about half a minute)")
     trial = ErrorStateFilter(FootSettings(), "left")
     for i in range(12):
         trial.on_imu(ImuSample(i * 2_500_000, np.array([0.0, 9.80665, 0.0]), np.zeros(3), None))
     trial.estimate(30_000_000)
-    _log.info("the foot filter is ready after %.1f s", time.perf_counter() - begun)
+    _log.info("the foot filter is ready")
