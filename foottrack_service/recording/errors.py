@@ -4,7 +4,8 @@
 
     RecordingError          the file cannot be read or written; ``offset`` says where
     ├── DiskFullError       the recording was ended, properly, before the disk was full
-    └── WriteError          the system refused the bytes: what was flushed before can be recovered
+    ├── WriteError          the system refused the bytes: what was flushed before can be recovered
+    └── ReplayRefusedError  somebody publishes the same topics live
 """
 
 from __future__ import annotations
@@ -31,3 +32,12 @@ class DiskFullError(RecordingError):
 
 class WriteError(RecordingError):
     """The system refused the bytes (no space although it had said so, a disk pulled out)."""
+
+
+class ReplayRefusedError(RecordingError):
+    """Played as asked, two sources would speak on one topic. Attribute: ``topics``."""
+
+    def __init__(self, path: Path, topics: list[str]) -> None:
+        shown = ", ".join(topics[:4]) + (", ..." if len(topics) > 4 else "")
+        super().__init__(path, f"{shown} is published live: play it as another user, or leave these streams out")
+        self.topics = topics

@@ -10,13 +10,11 @@ from typing import Any, NamedTuple
 from foottrack_protocol import Message
 from foottrack_protocol.messages import Imu
 from foottrack_protocol.topics import SYSTEM, TOPICS, Role
-from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.errors import ControlError
 from foottrack_service.recording.recording import Recorded, Recording
-from foottrack_service.recording.replay import Pacer
+from foottrack_service.recording.replay import MAX_RATE, MIN_RATE, Pacer
 
-LISTEN_S = 1.5
-"""How long to listen for live publishers: a stream that matters comes at least once a second."""
+KEY_SEEK_S = 5.0
 BATCH = 64
 """Messages published before the event loop gets its turn, when the replay is behind."""
 
@@ -45,7 +43,7 @@ class LiveReplay:
     def __init__(
         self,
         recording: Recording,
-        publish: Callable[[Message], None],
+        publish: Callable[[Message], object],
         clock: Callable[[], int],
         *,
         rate: float = 1.0,
@@ -77,6 +75,26 @@ class LiveReplay:
             "replay/seek": self.seek,
             "replay/rate": self.set_rate,
         }
+
+    def on_key(self, key: str) -> bool:
+        """What a key in the terminal does; False for the one that ends it.
+
+        Space pauses and resumes, the arrows go 5 s back and forth, ``+`` and ``-`` double and halve the rate, ``0``
+        begins anew, ``q`` ends.
+        """
+        status = self.status
+        if key == "q":
+            return False
+        if key == " ":
+            (self.resume if status.paused else self.pause)()
+        elif key in ("left", "right"):
+            self.seek(status.position + (KEY_SEEK_S if key == "right" else -KEY_SEEK_S))
+        elif key in ("+", "-"):
+            rate = status.rate * 2.0 if key == "+" else status.rate / 2.0
+            self.set_rate(min(max(rate, MIN_RATE), MAX_RATE))
+        elif key == "0":
+            self.seek(0.0)
+        return True
 
     @property
     def status(self) -> Status:
@@ -176,19 +194,3 @@ class LiveReplay:
         moved = message._replace(user=user, sid=self._sid, seq=seq, t=self._pacer.bus_time(message.t), data=data)
         self._publish(moved._replace(t_pub=self._clock()))
         self._published += 1
-
-
-async def live_topics(bus: Bus, users: Collection[str], listen_s: float = LISTEN_S) -> set[str]:
-    """Topics of these users that somebody publishes now."""
-    subscriber = bus.subscriber([f"{user}/" for user in users])
-    seen: set[str] = set()
-    try:
-        await subscriber.ready()
-        async with asyncio.timeout(listen_s):
-            async for received in subscriber:
-                seen.add(received.message.topic)
-    except TimeoutError:
-        pass
-    finally:
-        subscriber.close()
-    return seen

@@ -11,7 +11,9 @@ from pydantic import StringConstraints
 
 from foottrack_protocol.topics import split_topic
 from foottrack_service.bus.connection import Bus
+from foottrack_service.bus.endpoints import HWM
 from foottrack_service.bus.errors import ControlError
+from foottrack_service.bus.subscriber import Received
 from foottrack_service.config import Settings, to_toml
 from foottrack_service.recording.errors import DiskFullError, RecordingError
 from foottrack_service.recording.writer import RecordingWriter, WriterStats
@@ -30,6 +32,15 @@ async def run(
     """
     subscriber = bus.subscriber()
     recorded: dict[bytes, bool] = {}
+
+    def take(batch: list[Received]) -> None:
+        for message, arrival, (topic, payload) in batch:
+            wanted = recorded.get(topic)
+            if wanted is None:
+                wanted = recorded[topic] = split_topic(message.topic)[1].recorded
+            if wanted:
+                writer.write(topic, payload, arrival, message.t_pub, message.seq)
+
     try:
         await subscriber.ready()
         writer = RecordingWriter(path, to_toml(settings), bus.clock)
@@ -37,15 +48,11 @@ async def run(
             if on_started is not None:
                 on_started(writer)
             async for batch in subscriber.batches():
-                for message, arrival, (topic, payload) in batch:
-                    wanted = recorded.get(topic)
-                    if wanted is None:
-                        wanted = recorded[topic] = split_topic(message.topic)[1].recorded
-                    if wanted:
-                        writer.write(topic, payload, arrival, message.t_pub, message.seq)
+                take(batch)
                 if writer.error is not None:
                     raise writer.error
         finally:
+            take(subscriber.drain(HWM))
             await asyncio.shield(asyncio.to_thread(writer.close))
         return writer.stats
     finally:
