@@ -96,6 +96,11 @@ class RealSenseSource:
         """Raises SourceError when there is none, or it cannot do what is asked."""
         rs = _library()
         self._reader = FramesetReader(settings, exposure)
+        serials = [device.get_info(rs.camera_info.serial_number) for device in rs.context().query_devices()]
+        # Starting a pipeline without a camera would wait for one for 15 s.
+        if not serials or (settings.serial and settings.serial not in serials):
+            there = ", ".join(serials) or "none"
+            raise SourceError(f"no RealSense {settings.serial}".rstrip() + f" is plugged in (found: {there})")
         self._pipeline = rs.pipeline()
         config = rs.config()
         if settings.serial:
@@ -108,7 +113,7 @@ class RealSenseSource:
         except RuntimeError as error:
             wanted = f"{size[0]}x{size[1]} at {settings.fps}/s"
             raise SourceError(
-                f"no RealSense with colour and depth of {wanted}: {error} (USB 3 port and cable?)"
+                f"no RealSense does colour and depth of {wanted}: {error} (USB 3 port and cable?)"
             ) from error
         stream = profile.get_stream(rs.stream.color).as_video_stream_profile()
         self.intrinsics = lens_of(stream.get_intrinsics())
