@@ -95,6 +95,12 @@ class Recorded(Body):
     duration: Seconds
 
 
+class ReplayAttach(Body):
+    """Where a replay listens."""
+
+    endpoint: Str = Field(description="ZeroMQ endpoint on the service's host, which answers the `replay/...` requests")
+
+
 class ReplaySeek(Body):
     """Where to go on."""
 
@@ -148,6 +154,9 @@ COMMANDS: dict[str, Command] = {
         RecordStart, RecordingFile, (Code.BUSY, Code.EXISTS, Code.FAILED), "a recording, into the recordings folder"
     ),
     "record/stop": Command(NoArguments, Recorded, (Code.NOT_RUNNING,), "ends and closes the recording"),
+    "replay/attach": Command(
+        ReplayAttach, NoArguments, (), "a replay in a process of its own can be asked there; the others are passed on to it"
+    ),
     "replay/pause": Command(NoArguments, ReplayState, _REPLAY, "holds the replay"),
     "replay/resume": Command(NoArguments, ReplayState, _REPLAY, "goes on"),
     "replay/seek": Command(ReplaySeek, ReplayState, _REPLAY, "goes on from there"),

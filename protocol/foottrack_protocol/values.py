@@ -27,11 +27,10 @@ _T = TypeVar("_T", bound=tuple[float, ...])
 
 
 def _unit_length(v: _T) -> _T:
-    squared = sum([x * x for x in v])
+    norm = math.hypot(*v)
     # Normalising what is already normal would change last bits and make re-encoding differ.
-    if abs(squared - 1.0) <= 2e-15:
+    if abs(norm - 1.0) <= 1e-15:
         return v
-    norm = math.sqrt(squared)
     if not abs(norm - 1.0) <= UNIT_TOLERANCE:
         raise ValueError(f"length {norm:.6g}, must be 1 within {UNIT_TOLERANCE}")
     return tuple([x / norm for x in v])  # type: ignore[return-value]

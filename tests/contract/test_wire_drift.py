@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from foottrack_protocol.generate import COMMAND, FOLDER, SpecError, drift, with_tables, write
+from foottrack_protocol.generate import COMMAND, FOLDER, GENERATED, SpecError, drift, with_tables, write
 
 
 def test_generated_files_are_up_to_date() -> None:
@@ -19,9 +19,9 @@ def test_generated_files_are_up_to_date() -> None:
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    for name in ("SPEC.md", "schema", "vectors"):
-        source = FOLDER / name
-        (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / name)  # type: ignore[operator]
+    shutil.copy(FOLDER / "SPEC.md", tmp_path)
+    for name in GENERATED:
+        shutil.copytree(FOLDER / name, tmp_path / name)
     return tmp_path
 
 

@@ -73,9 +73,10 @@ def test_numpy_and_other_integers_in_the_envelope_are_refused(field: str, value:
         encode(GOOD._replace(**{field: value}))
 
 
-def test_numpys_bool_is_refused_in_the_envelope() -> None:
+@pytest.mark.parametrize("value", [np.bool_(True), 1, None, "true"])
+def test_numpys_bool_and_other_truths_are_refused_in_the_envelope(value: Any) -> None:
     with pytest.raises(EncodeError, match="valid"):
-        encode(GOOD._replace(valid=np.bool_(True)))
+        encode(GOOD._replace(valid=value))
 
 
 def test_numpys_floats_and_arrays_become_plain_ones_in_a_body() -> None:
