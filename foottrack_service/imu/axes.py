@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 
+from foottrack_protocol.messages import Imu
 from foottrack_service import rotations
 from foottrack_service.imu.sample import DeviceSample, Quat, Vec3
 
@@ -61,16 +62,25 @@ class Axes:
         back = rotations.multiply(rotations.conjugate(self._world), q)
         return _quat(rotations.multiply(back, rotations.conjugate(self._from_sensor)))
 
-    def to_wire(self, sample: DeviceSample, t_dev_us: int | None, t_arr: int) -> dict[str, object]:
-        """The wire's ``Imu`` body. ``t_dev_us`` is the unwrapped counter, ``t_arr`` the arrival in ns."""
-        return {
-            "acc": self.vector(sample.acc),
-            "gyro": None if sample.gyro is None else self.vector(sample.gyro),
-            "q": None if sample.q is None else self.rotation(sample.q),
-            "t_dev": t_dev_us,
-            "t_arr": t_arr,
-            "accuracy": sample.accuracy,
-        }
+    def to_wire(self, sample: DeviceSample, t_dev_us: int | None, t_arr: int) -> Imu:
+        """The wire's body. ``t_dev_us`` is the unwrapped counter, ``t_arr`` the arrival, ns. Raises ValidationError."""
+        return Imu(
+            acc=self.vector(sample.acc),
+            gyro=None if sample.gyro is None else self.vector(sample.gyro),
+            q=None if sample.q is None else self.rotation(sample.q),
+            t_dev=t_dev_us,
+            t_arr=t_arr,
+            accuracy=sample.accuracy,
+        )
+
+    def from_wire(self, acc: Vec3, gyro: Vec3 | None, q: Quat | None, ticks: int | None) -> DeviceSample:
+        """What a device would have measured, for a simulated one."""
+        return DeviceSample(
+            ticks,
+            self.device_vector(acc),
+            None if gyro is None else self.device_vector(gyro),
+            None if q is None else self.device_rotation(q),
+        )
 
 
 def _quat(q: rotations.Array) -> Quat:

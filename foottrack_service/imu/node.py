@@ -1,0 +1,182 @@
+"""The IMUs of both feet onto the bus."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from collections import Counter
+from functools import partial
+
+from foottrack_protocol.frames import SIDES
+from foottrack_protocol.messages import Side
+from foottrack_service.bus.connection import Bus
+from foottrack_service.bus.publisher import Publisher
+from foottrack_service.config import Settings
+from foottrack_service.imu import ports
+from foottrack_service.imu.formats import SERIAL_FORMATS
+from foottrack_service.imu.link import SerialLink
+from foottrack_service.imu.settings import ImuDeviceSettings
+from foottrack_service.imu.slimevr import SlimeVrServer, TrackerSample
+from foottrack_service.imu.stream import SerialStream, Stamped, Stamper
+from foottrack_service.imu.udp import SlimeVrSocket
+
+REPORT_S = 1.0
+
+_log = logging.getLogger(__name__)
+
+
+async def run(bus: Bus, settings: Settings) -> None:
+    """Publish ``imu/left`` and ``imu/right`` from the devices that the settings name, until cancelled.
+
+    A device that is missing or unplugged is awaited and disturbs nobody else. Raises OSError when the socket for
+    SlimeVR trackers cannot be opened.
+    """
+    imu = settings.imu
+    taken: dict[Side, str] = {}
+    trackers: dict[Side, ImuDeviceSettings] = {}
+    async with asyncio.TaskGroup() as tasks:
+        for side, device in zip(SIDES, (imu.left, imu.right), strict=True):
+            if device.format == "slimevr":
+                trackers[side] = device
+            elif device.format != "off":
+                foot = _SerialFoot(bus, settings.user, side, device, taken)
+                tasks.create_task(foot.run(), name=f"imu {side}")
+        if trackers:
+            await _start_trackers(tasks, bus, settings, trackers)
+
+
+class _Foot:
+    """One side's publisher."""
+
+    def __init__(self, bus: Bus, user: str, side: Side) -> None:
+        self._user = user
+        self._stream = f"imu/{side}"
+        self._reported: Counter[str] = Counter()
+        self.name = f"imu-{side}"
+        self.publisher: Publisher = bus.publisher(self.name)
+
+    def publish(self, stamped: Stamped) -> None:
+        self.publisher.publish(self._user, self._stream, stamped.t, stamped.imu)
+
+    def report(self, drops: Counter[str]) -> None:
+        """Say what was dropped since the last report."""
+        fresh = drops - self._reported
+        if fresh:
+            text = ", ".join(f"{count} {reason}" for reason, count in sorted(fresh.items()))
+            _log.warning("%s dropped: %s", self.name, text)
+        self._reported = Counter(drops)
+
+
+class _SerialFoot(_Foot):
+    def __init__(self, bus: Bus, user: str, side: Side, device: ImuDeviceSettings, taken: dict[Side, str]) -> None:
+        super().__init__(bus, user, side)
+        self._side = side
+        self._device = device
+        self._taken = taken
+        self._bus = bus
+        self._running = False
+        self._source = SerialStream(device)
+        known = SERIAL_FORMATS[device.format]
+        self._link = SerialLink(
+            self.name,
+            self._find_port,
+            device.baud or known.baud,
+            on_open=self._source.replugged,
+            on_data=self._on_data,
+            to_send=self._source.to_send,
+            clock=bus.clock,
+            byte_gap_s=known.byte_gap_s,
+            on_state=self._on_state,
+        )
+
+    async def run(self) -> None:
+        await self.publisher.ready()
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._link.run())
+            tasks.create_task(self._report())
+
+    async def _report(self) -> None:
+        while True:
+            self.report(self._source.drops)
+            await asyncio.sleep(REPORT_S)
+
+    def _on_state(self, failure: str | None) -> None:
+        board = self._bus.health
+        if failure is None:
+            board.node(self.name, "running")
+        elif self._link.connections == 0:
+            board.node(self.name, "starting", failure)
+        elif self._running:
+            board.node(self.name, "restarting", failure)
+        self._running = failure is None
+
+    def _find_port(self) -> str:
+        others = {port for side, port in self._taken.items() if side != self._side}
+        port = ports.find(self._device.port, ports.available(), others)
+        self._taken[self._side] = port
+        return port
+
+    def _on_data(self, data: bytes, t_arr: int) -> None:
+        for stamped in self._source.feed(data, t_arr):
+            self.publish(stamped)
+
+
+class _TrackerFoot(_Foot):
+    def __init__(self, bus: Bus, user: str, side: Side, device: ImuDeviceSettings) -> None:
+        super().__init__(bus, user, side)
+        self.wanted = None if device.port == "auto" else _tracker_name(device.port)
+        self.stamper = Stamper(device, None)
+
+
+async def _start_trackers(
+    tasks: asyncio.TaskGroup, bus: Bus, settings: Settings, devices: dict[Side, ImuDeviceSettings]
+) -> None:
+    feet = [_TrackerFoot(bus, settings.user, side, device) for side, device in devices.items()]
+    turn = next((device.acc_turn for device in devices.values() if device.acc_turn is not None), None)
+    server = SlimeVrServer(None if turn is None else math.remainder(turn, 2.0 * math.pi))
+    for foot in feet:
+        await foot.publisher.ready()
+    imu = settings.imu
+    socket = await SlimeVrSocket.open(
+        imu.slimevr_host, imu.slimevr_port, server, partial(_on_tracker_sample, feet), bus.clock
+    )
+    tasks.create_task(socket.run(), name="slimevr")
+    tasks.create_task(_watch_trackers(bus, server, feet), name="slimevr watch")
+
+
+def _on_tracker_sample(feet: list[_TrackerFoot], sample: TrackerSample, t_arr: int) -> None:
+    foot = next((foot for foot in feet if foot.wanted == sample.name), None)
+    if foot is None:
+        foot = next((foot for foot in feet if foot.wanted is None), None)
+        if foot is None:
+            return
+        # First come, first served, and it stays so: which foot it is on is found by tapping.
+        foot.wanted = sample.name
+        _log.info("%s: taken by tracker %s", foot.name, sample.name)
+    stamped = foot.stamper.stamp(sample.sample, t_arr, None)
+    if stamped is not None:
+        foot.publish(stamped)
+
+
+async def _watch_trackers(bus: Bus, server: SlimeVrServer, feet: list[_TrackerFoot]) -> None:
+    reported: Counter[str] = Counter()
+    while True:
+        for foot in feet:
+            mac = (foot.wanted or "").split("/")[0]
+            if mac in server.trackers:
+                bus.health.node(foot.name, "running")
+            else:
+                bus.health.node(foot.name, "starting", f"waits for tracker {foot.wanted or '(any)'}")
+            foot.report(foot.stamper.drops)
+        fresh = server.drops - reported
+        if fresh:
+            _log.warning("slimevr dropped: %s", dict(fresh))
+        reported = Counter(server.drops)
+        await asyncio.sleep(REPORT_S)
+
+
+def _tracker_name(port: str) -> str:
+    """``AA:BB:CC:DD:EE:FF`` is its first sensor."""
+    mac, _, sensor = port.partition("/")
+    return f"{mac.upper()}/{sensor or 0}"

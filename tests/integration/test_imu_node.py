@@ -1,0 +1,245 @@
+"""Simulated devices at the other end of a pty or a socket, through the node, onto the bus."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import sys
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from foottrack_protocol.frames import STANDARD_GRAVITY
+from foottrack_protocol.messages import Imu
+from foottrack_service import rotations
+from foottrack_service.bus import Bus
+from foottrack_service.bus.clock import now
+from foottrack_service.config import Settings
+from foottrack_service.imu import node
+from foottrack_service.imu.axes import Axes
+from foottrack_service.imu.devices.bno08x import Bno08xDevice
+from foottrack_service.imu.devices.pty_port import PtyPort
+from foottrack_service.imu.devices.serial_devices import AsciiDevice, RawDevice, RvcDevice, SimulatedDevice
+from foottrack_service.imu.devices.slimevr import SlimeVrDevice
+from foottrack_service.imu.sample import DeviceSample
+
+PERIOD_S = 0.005
+TILT = rotations.from_axis_angle([0.0, 0.0, 1.0], 0.3)
+"""Sensor to a y-up world, on the wire."""
+
+
+def at_rest(ticks: int) -> DeviceSample:
+    x, y, z = rotations.unrotate(TILT, [0.0, STANDARD_GRAVITY, 0.0])
+    q = tuple(float(v) for v in TILT)
+    return Axes().from_wire((float(x), float(y), float(z)), (0.1, 0.2, 0.3), q, ticks)  # type: ignore[arg-type]
+
+
+class Wearer:
+    """Plays a device into a pty in real time, and answers for it."""
+
+    def __init__(self, port: Path, device: SimulatedDevice) -> None:
+        self._port = port
+        self._device = device
+        self._pty: PtyPort | None = None
+
+    def plug(self) -> None:
+        self._pty = PtyPort()
+        fresh = self._port.with_suffix(".new")
+        fresh.symlink_to(self._pty.port)
+        fresh.replace(self._port)
+
+    def unplug(self) -> None:
+        if self._pty is not None:
+            self._pty.close()
+        self._pty = None
+
+    async def run(self) -> None:
+        start = now()
+        while True:
+            if self._pty is not None:
+                self._pty.write(self._device.hear(self._pty.read()))
+                self._pty.write(self._device.measure(at_rest((now() - start) // 1000)))
+            await asyncio.sleep(PERIOD_S)
+
+
+class Listener:
+    """Counts what comes on the bus, by stream."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.subscriber = bus.subscriber(["user/imu/"])
+        self.messages: dict[str, list[Any]] = {"imu/left": [], "imu/right": []}
+
+    async def until(self, condition: Callable[[], bool]) -> None:
+        async with asyncio.timeout(15.0):
+            while not condition():
+                for received in self.subscriber.drain():
+                    self.messages[received.message.stream].append(received.message)
+                await asyncio.sleep(0.005)
+
+    def count(self, side: str) -> int:
+        return len(self.messages[f"imu/{side}"])
+
+
+async def stopped(*tasks: asyncio.Task[Any]) -> None:
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def check_at_rest(message: Any, has_gyro: bool, has_q: bool) -> None:
+    imu = message.data
+    assert isinstance(imu, Imu)
+    up = rotations.rotate(TILT, imu.acc)
+    np.testing.assert_allclose(up, [0.0, STANDARD_GRAVITY, 0.0], atol=0.02)
+    assert (imu.gyro is not None) == has_gyro
+    assert (imu.q is not None) == has_q
+    if imu.q is not None:
+        assert rotations.angle_between(imu.q, TILT) < 1e-3
+    if imu.gyro is not None:
+        np.testing.assert_allclose(imu.gyro, [0.1, 0.2, 0.3], atol=0.002)
+    assert message.t <= imu.t_arr <= message.t_pub
+
+
+CASES: list[tuple[str, Callable[[], SimulatedDevice], bool, bool]] = [
+    ("ascii", AsciiDevice, False, True),
+    ("rvc", RvcDevice, False, True),
+    ("bno08x", Bno08xDevice, True, True),
+    ("raw", RawDevice, True, False),
+]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no ptys")
+@pytest.mark.parametrize(("name", "make", "has_gyro", "has_q"), CASES)
+def test_from_bytes_to_the_bus(
+    name: str, make: Callable[[], SimulatedDevice], has_gyro: bool, has_q: bool, tmp_path: Path, bus: Bus, run: Any
+) -> None:
+    async def scenario() -> None:
+        wearer = Wearer(tmp_path / "left", make())
+        wearer.plug()
+        settings = Settings(imu={"left": {"format": name, "port": str(tmp_path / "left"), "delay": 0.002}})
+        listener = Listener(bus)
+        await listener.subscriber.ready()
+        tasks = [asyncio.create_task(node.run(bus, settings)), asyncio.create_task(wearer.run())]
+        await listener.until(lambda: listener.count("left") >= 40)
+        await stopped(*tasks)
+        wearer.unplug()
+        messages = listener.messages["imu/left"]
+        for message in messages:
+            check_at_rest(message, has_gyro, has_q)
+            assert message.src == "imu-left"
+            assert message.data.t_arr - message.t >= 2_000_000
+        assert [message.seq for message in messages] == list(range(len(messages)))
+        assert all(a.t <= b.t for a, b in pairwise(messages))
+
+    run(scenario())
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no ptys")
+def test_one_foot_unplugged_does_not_disturb_the_other(tmp_path: Path, bus: Bus, run: Any) -> None:
+    async def scenario() -> None:
+        left, right = Wearer(tmp_path / "left", Bno08xDevice()), Wearer(tmp_path / "right", RawDevice())
+        left.plug()
+        right.plug()
+        settings = Settings(
+            imu={
+                "left": {"format": "bno08x", "port": str(tmp_path / "left"), "rate": 200},
+                "right": {"format": "raw", "port": str(tmp_path / "right")},
+            }
+        )
+        listener = Listener(bus)
+        await listener.subscriber.ready()
+        tasks = [
+            asyncio.create_task(node.run(bus, settings)),
+            asyncio.create_task(left.run()),
+            asyncio.create_task(right.run()),
+        ]
+        await listener.until(lambda: min(listener.count("left"), listener.count("right")) >= 20)
+        left.unplug()
+        await listener.until(lambda: _state(bus, "imu-left") == "restarting")
+        so_far, right_so_far = listener.count("left"), listener.count("right")
+        await listener.until(lambda: listener.count("right") >= right_so_far + 50)
+        assert listener.count("left") <= so_far + 5
+        left.plug()
+        await listener.until(lambda: listener.count("left") >= so_far + 20)
+        await listener.until(lambda: _state(bus, "imu-left") == "running")
+        await stopped(*tasks)
+        left.unplug()
+        right.unplug()
+        # Nothing was lost of the other, nor was it late.
+        rights = [message.data.t_dev for message in listener.messages["imu/right"]]
+        assert max(b - a for a, b in pairwise(rights)) < 500_000
+        assert bus.health.body().nodes["imu-left"].restarts == 1
+
+    run(scenario())
+
+
+def _state(bus: Bus, name: str) -> str | None:
+    health = bus.health.body().nodes.get(name)
+    return None if health is None else health.state
+
+
+class Datagrams(asyncio.DatagramProtocol):
+    """A simulated tracker on a socket of its own."""
+
+    def __init__(self, device: SlimeVrDevice) -> None:
+        self._device = device
+
+    def connection_made(self, transport: Any) -> None:
+        self.transport = transport
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:
+        for reply in self._device.hear(data, now() * 1e-9):
+            self.transport.sendto(reply)
+
+    async def run(self) -> None:
+        while True:
+            for datagram in self._device.idle(now() * 1e-9) + self._device.measure(at_rest(0)):
+                self.transport.sendto(datagram)
+            await asyncio.sleep(PERIOD_S)
+
+
+def test_slimevr_trackers_come_over_udp(bus: Bus, run: Any) -> None:
+    async def scenario() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        macs = {"left": "A0:00:00:00:00:01", "right": "A0:00:00:00:00:02"}
+        settings = Settings(
+            imu={
+                "slimevr_host": "127.0.0.1",
+                "slimevr_port": port,
+                "left": {"format": "slimevr", "port": macs["left"].lower()},
+                "right": {"format": "slimevr"},
+            }
+        )
+        listener = Listener(bus)
+        await listener.subscriber.ready()
+        loop = asyncio.get_running_loop()
+        tasks = [asyncio.create_task(node.run(bus, settings))]
+        await listener.until(lambda: _state(bus, "imu-left") == "starting")
+        trackers = []
+        for mac in macs.values():
+            transport, tracker = await loop.create_datagram_endpoint(
+                lambda mac=mac: Datagrams(SlimeVrDevice(mac)), remote_addr=("127.0.0.1", port)
+            )
+            trackers.append(transport)
+            tasks.append(asyncio.create_task(tracker.run()))
+        await listener.until(lambda: min(listener.count("left"), listener.count("right")) >= 20)
+        await listener.until(lambda: _state(bus, "imu-left") == "running")
+        await stopped(*tasks)
+        for transport in trackers:
+            transport.close()
+        for side in macs:
+            for message in listener.messages[f"imu/{side}"]:
+                check_at_rest(message, has_gyro=False, has_q=True)
+                assert message.data.t_dev is None
+
+    run(scenario())
+
+
+def test_without_devices_the_node_ends(bus: Bus, run: Any) -> None:
+    run(node.run(bus, Settings()))
