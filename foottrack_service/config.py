@@ -19,6 +19,7 @@ from pydantic_settings import BaseSettings, EnvSettingsSource, PydanticBaseSetti
 from foottrack_protocol.frames import TAG_ON_INSTEP
 from foottrack_protocol.messages import Float, Quat, Side, Vec3
 from foottrack_protocol.topics import DEFAULT_USER, is_user
+from foottrack_service.imu.settings import ImuSettings
 
 DEFAULT_FILE = Path("foottrack.toml")
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -173,6 +174,7 @@ class Settings(BaseSettings):
     body: BodySettings = BodySettings()
     feet: FeetSettings = FeetSettings()
     camera: CameraSettings = CameraSettings()
+    imu: ImuSettings = ImuSettings()
     timing: TimingSettings = TimingSettings()
     fusion: FusionSettings = FusionSettings()
     bus: BusSettings = BusSettings()
