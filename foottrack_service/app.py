@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +20,8 @@ from foottrack_service.bus.session import SessionInfo, publish_session
 from foottrack_service.config import Settings
 from foottrack_service.fusion import node as fusion_node
 from foottrack_service.recording import node as recording_node
+from foottrack_service.recording.node import Recorder
+from foottrack_service.recording.replay_desk import ReplayDesk
 
 NodeRun = Callable[[Bus, Settings], Awaitable[None]]
 
@@ -63,9 +65,8 @@ class Service:
     An async context manager: inside, everything runs; leaving it stops all of it in order.
     """
 
-    def __init__(self, settings: Settings, handlers: Mapping[str, Callable[..., Any]] | None = None) -> None:
+    def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        self._handlers = dict(handlers or {})
         self._broker = Broker(settings.bus)
         self._tasks: list[asyncio.Task[None]] = []
         self._failure: asyncio.Future[None] | None = None
@@ -86,7 +87,10 @@ class Service:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         logging.getLogger().removeHandler(self._log_handler)
+        if self._recorder.recording:
+            await self._recorder.stop()
         self._control.close()
+        self._replays.close()
         self.bus.close()
         self._broker.stop()
 
@@ -121,10 +125,12 @@ class Service:
         self._failure = asyncio.get_running_loop().create_future()
         self.bus = Bus.connect(self._broker.inproc, self._broker.context)
         self._session = SessionInfo([self.settings.user], self.settings.digest)
+        self._recorder = Recorder(self.bus, self.settings, self.settings.recording.folder)
+        self._replays = ReplayDesk(self._broker.context)
         self._control = ControlServer(
             self._broker.context,
             self.settings.bus.control,
-            self._handlers,
+            {**self._recorder.handlers, **self._replays.handlers},
             session=self._session,
             board=self.bus.health,
         )

@@ -130,7 +130,10 @@ class TimingSettings(Section):
 class FusionSettings(Section):
     """The fusion node."""
 
-    filter: Literal["reference"] = "reference"
+    filter: Literal["error-state", "reference"] = Field(
+        default="error-state", description="ours, or the published one that reports compare with"
+    )
+    floor: bool = Field(default=True, description="a standing sole is on the floor; false where there are stairs")
     max_output_hz: Positive = 200.0
     silence: Positive = Field(default=0.02, description="when nothing came for so long, a timer publishes, s")
 
@@ -157,6 +160,12 @@ class BusSettings(Section):
         return cls(ingress=ingress, egress=egress, control=control)
 
 
+class RecordingSettings(Section):
+    """Recordings on request."""
+
+    folder: Path = Field(default=Path("recordings"), description="where `record/start` puts them, and nowhere else")
+
+
 def _user_name(name: str) -> str:
     if not is_user(name):
         raise ValueError("a user is a-z, 0-9 and '-', at most 32 characters, and not 'sys'")
@@ -178,6 +187,7 @@ class Settings(BaseSettings):
     timing: TimingSettings = TimingSettings()
     fusion: FusionSettings = FusionSettings()
     bus: BusSettings = BusSettings()
+    recording: RecordingSettings = RecordingSettings()
 
     @classmethod
     def settings_customise_sources(

@@ -8,8 +8,9 @@ import typer
 
 from foottrack_protocol.errors import ProtocolError
 from foottrack_service.bus.errors import BusError
-from foottrack_service.cli import bench, demo, running, service, sim, watch
+from foottrack_service.cli import bench, demo, log, recordings, running, service, sim, watch
 from foottrack_service.config import ConfigError
+from foottrack_service.recording.errors import RecordingError
 
 app = typer.Typer(
     name="foottrack",
@@ -21,9 +22,12 @@ app.command()(demo.demo)
 app.command()(service.run)
 app.command()(service.node)
 app.command()(sim.sim)
+app.command()(recordings.record)
+app.command()(recordings.replay)
 app.command()(watch.top)
 app.command()(watch.echo)
 app.command()(bench.bench)
+app.add_typer(log.app, name="log", help="Look into recordings: info, cat, export, import, diff, recover.")
 
 
 def main() -> None:
@@ -35,7 +39,7 @@ def main() -> None:
         running.fail(str(error), error.code)
     except ConfigError as error:
         running.fail(str(error), running.EXIT_USAGE)
-    except (BusError, ProtocolError) as error:
+    except (BusError, ProtocolError, RecordingError) as error:
         running.fail(str(error))
     except BrokenPipeError:
         sys.stderr.close()

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import StringConstraints
 
+from foottrack_protocol.control import Code
 from foottrack_protocol.topics import split_topic
 from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.endpoints import HWM
@@ -66,6 +67,7 @@ class Recorder:
         self._bus = bus
         self._settings = settings
         self._folder = folder
+        self._began = 0
         self._writer: RecordingWriter | None = None
         self._task: asyncio.Task[WriterStats] | None = None
 
@@ -74,14 +76,22 @@ class Recorder:
         """For the control socket: ``record/start {name}`` and ``record/stop``."""
         return {"record/start": self.start, "record/stop": self.stop}
 
+    @property
+    def recording(self) -> bool:
+        """Whether one runs, or has ended by itself and was not asked for yet."""
+        return self._task is not None
+
     async def start(self, name: RecordingName) -> dict[str, Any]:
         """Begin ``<name>.mcap``. Raises ControlError: one runs already, or the file cannot be made."""
         if self._task is not None and not self._task.done():
-            raise ControlError("busy", "a recording is running already")
+            raise ControlError(Code.BUSY, "a recording is running already")
         self._folder.mkdir(parents=True, exist_ok=True)
         started: asyncio.Future[RecordingWriter] = asyncio.get_running_loop().create_future()
         path = self._folder / (name + SUFFIX)
+        if path.exists():
+            raise ControlError(Code.EXISTS, f"{path} exists already")
         self._writer = None
+        self._began = self._bus.clock()
         self._task = asyncio.create_task(
             run(self._bus, self._settings, path, on_started=started.set_result), name="recorder"
         )
@@ -91,15 +101,16 @@ class Recorder:
             try:
                 await self._task
             except RecordingError as error:
-                raise ControlError("failed", str(error)) from None
+                self._task = None
+                raise ControlError(Code.FAILED, str(error)) from None
         self._writer = started.result()
-        return {"name": name}
+        return {"file": str(path)}
 
     async def stop(self) -> dict[str, Any]:
         """End the recording, and say what is in it. Raises ControlError: none runs, or it had ended badly."""
         task, writer = self._task, self._writer
         if task is None or writer is None:
-            raise ControlError("not_recording", "nothing is being recorded")
+            raise ControlError(Code.NOT_RUNNING, "nothing is being recorded")
         self._task = None
         task.cancel()
         try:
@@ -107,13 +118,13 @@ class Recorder:
         except asyncio.CancelledError:
             pass
         except DiskFullError:
-            pass  # the answer says so
+            pass  # whole up to there; the log said so when it happened
         except RecordingError as error:
-            raise ControlError("failed", str(error)) from None
+            raise ControlError(Code.FAILED, str(error)) from None
         stats = writer.stats
         return {
-            "name": writer.path.name.removesuffix(SUFFIX),
+            "file": str(writer.path),
             "messages": stats.written,
             "dropped": stats.dropped,
-            "error": str(writer.error) if writer.error is not None else None,
+            "duration": (self._bus.clock() - self._began) * 1e-9,
         }
