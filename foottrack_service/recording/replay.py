@@ -6,7 +6,7 @@ from foottrack_service.recording.recording import Span
 
 SLIP_NS = 500_000_000
 """Further behind than this (a laptop slept, the machine is too slow for the rate) a replay goes on from where it is."""
-MIN_RATE, MAX_RATE = 0.01, 100.0
+MIN_RATE, MAX_RATE = 0.01, 1000.0
 
 
 class Pacer:
@@ -31,9 +31,7 @@ class Pacer:
 
     def position(self, now: int) -> int:
         """Where the replay is, in the recording's time."""
-        if self.paused:
-            return self._recorded
-        return min(self._recorded + round((now - self._bus) * self.rate), self.span.last)
+        return min(self._at(now), self.span.last)
 
     def wait(self, arrival: int, now: int) -> int | None:
         """How long until a message is due, ns, 0 when it is; None while paused."""
@@ -47,18 +45,18 @@ class Pacer:
 
     def pause(self, now: int) -> None:
         """Stand still at the position."""
-        self._anchor(now, self.position(now))
+        self._anchor(now, self._at(now))
         self.paused = True
 
     def resume(self, now: int) -> None:
         """Go on from the position."""
-        self._anchor(now, self.position(now))
+        self._anchor(now, self._at(now))
         self.paused = False
 
     def set_rate(self, rate: float, now: int) -> None:
-        """Go on at another rate. Raises ValueError outside 0.01 to 100."""
+        """Go on at another rate. Raises ValueError outside 0.01 to 1000."""
         rate = _checked(rate)
-        self._anchor(now, self.position(now))
+        self._anchor(now, self._at(now))
         self.rate = rate
 
     def seek(self, recorded: int, now: int) -> int:
@@ -66,6 +64,9 @@ class Pacer:
         reached = min(max(recorded, self.span.first), self.span.last)
         self._anchor(now, reached)
         return reached
+
+    def _at(self, now: int) -> int:
+        return self._recorded if self.paused else self._recorded + round((now - self._bus) * self.rate)
 
     def _anchor(self, bus: int, recorded: int) -> None:
         self._bus, self._recorded = bus, recorded
