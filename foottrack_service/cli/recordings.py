@@ -125,7 +125,7 @@ async def _show_recording(started: asyncio.Future[RecordingWriter], file: Path) 
 async def _replay(settings: Settings, file: Path, rate: float, loop: bool, results: bool, user: str | None) -> None:
     from foottrack_protocol.topics import Role
     from foottrack_service.bus.connection import Bus
-    from foottrack_service.recording.live_replay import play
+    from foottrack_service.recording.play import play
     from foottrack_service.recording.reader import open_recording
 
     recording = open_recording(file)
