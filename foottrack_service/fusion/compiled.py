@@ -5,14 +5,34 @@ The first start on a machine compiles them (``warm_up`` in foot_filter says so);
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+import platformdirs
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def compiled(function: F) -> F:
     """The function, compiled at its first call. IEEE rules are kept: the same input gives the same bits."""
-    return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = before or _CACHE
+    try:
+        return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def _cache_folder() -> str:
+    # Numba renews a function's cache when its own file changes, but not when a constant or a function that it takes
+    # from another file does: so the cache is named by all files of this room.
+    digest = hashlib.sha256()
+    for file in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(file.read_bytes())
+    return str(Path(platformdirs.user_cache_dir("foottrack", appauthor=False)) / f"kernels-{digest.hexdigest()[:16]}")
+
+
+_CACHE = _cache_folder()

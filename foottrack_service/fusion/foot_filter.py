@@ -44,6 +44,7 @@ class ErrorStateFilter:
     def on_fix(self, fix: OpticalFix, now: int) -> Verdict:
         """Take an optical fix that arrives at ``now``, later than its own ``t``."""
         if fix.kind == "depth" and self._ladder.fix_within("marker", fix.t):
+            self._inertial.learn_blob(fix)
             return Verdict.UNUSED
         seen = self._pictures.on_fix(fix)
         verdict = self._inertial.on_fix(fix)

@@ -6,7 +6,7 @@ kind are named here; every row has all of them.
 
 from __future__ import annotations
 
-COLUMNS = 24
+COLUMNS = 26
 
 KIND = 0
 IMU, FIX, RESET = 0.0, 1.0, 2.0
@@ -39,6 +39,8 @@ TURN_SIGMA = 21
 """rad; 0 without an attitude."""
 PLACED_DELAY = 22
 """The time offset with which the fix was put into the timeline, s."""
+ARM = 23
+"""The point that was seen, from the sensor, sensor frame, m, 3 columns; a reset has it too."""
 
 # A reset: POINT, then
 SPEED = 4

@@ -18,6 +18,7 @@ from foottrack_service.fusion.contact import STATISTIC, stance_sigma
 from foottrack_service.fusion.foot_filter_events import (
     ACC,
     ACCEPTED,
+    ARM,
     CLIPPED,
     FIX,
     FLOOR,
@@ -43,6 +44,7 @@ from foottrack_service.fusion.foot_filter_optical import (
     CHI_SQUARE_1,
     CHI_SQUARE_3,
     OLDEST_S,
+    Blob,
     Candidates,
     FixRows,
     Rejected,
@@ -54,12 +56,11 @@ from foottrack_service.fusion.foot_filter_replay import (
     ANKLE_ARM,
     FOOT_UP,
     HOLE_S,
-    MARKER_ARM,
     attitude_error,
     replay,
     smallest_variances,
 )
-from foottrack_service.fusion.interface import FIX_MEMORY_S, ImuSample, OpticalFix, Verdict
+from foottrack_service.fusion.interface import FIX_MEMORY_S, ImuSample, Kind, OpticalFix, Verdict
 from foottrack_service.fusion.timeline import Timeline
 from foottrack_service.rotations import Array
 
@@ -77,7 +78,7 @@ UNSURE_AFTER_S = 0.25
 """A hole in the IMU after which the place needs fixes that agree."""
 UNSURE_SIGMA = 0.3
 """m per axis: likewise."""
-SURE_AGE_S = 0.3
+SURE_AGE_S = 0.9
 SURE_SIGMA = 0.03
 SLOPE_SPAN_NS = 250_000_000
 SLOPE_NOISE = 0.04
@@ -93,6 +94,7 @@ class InertialFilter:
         self._timeline = Timeline()
         self._smallest = smallest_variances()
         self._imu_yaw: float | None = None
+        self._blob = Blob(foot)
         self.place(foot.imu)
         self._forget()
 
@@ -100,12 +102,11 @@ class InertialFilter:
         """The sensor's place on the shoe."""
         foot = self._foot
         p, self._imu_q = np.array(imu.p), rot.normalised(np.array(imu.q))
-        self._geometry = np.zeros(9)
-        self._geometry[MARKER_ARM : MARKER_ARM + 3] = rot.unrotate(self._imu_q, np.array(foot.marker.p) - p)
+        self._geometry = np.zeros(6)
         self._geometry[ANKLE_ARM : ANKLE_ARM + 3] = rot.unrotate(self._imu_q, -p)
         self._geometry[FOOT_UP : FOOT_UP + 3] = rot.unrotate(self._imu_q, np.array([0.0, 1.0, 0.0]))
         self._toe_arm = rot.unrotate(self._imu_q, np.array(foot.toe.p) - p)
-        self._fix_rows = FixRows(foot, self._imu_q)
+        self._fix_rows = FixRows(foot, p, self._imu_q, self._blob)
 
     def set_floor(self, height: float) -> None:
         """Floor height in the stage, m."""
@@ -167,11 +168,10 @@ class InertialFilter:
         replay(timeline.t, timeline.rows, timeline.X, timeline.P, i, i + 1, self._geometry, self._smallest)
         x, P = timeline.X[i], timeline.P[i]
         ours = self._fix_rows.take_attitude(row, fix, attitudes, x)
-        found = judged(row, x, P, self._rate(i), self._geometry)
+        found = judged(row, x, P, self._rate(i))
         good = ours and found[0] <= CHI_SQUARE_3 and found[1] <= CHI_SQUARE_1
         if self.acquired and good:
-            self._candidates.clear()
-            self._accept(i, t)
+            self._accept(i, t, fix.kind)
             return Verdict.ACCEPTED
         acquired = self.acquired
         if ours:
@@ -179,13 +179,22 @@ class InertialFilter:
             if row[TURN_SIGMA] > 0.0:
                 turn = float(attitude_error(row[MEASURED_Q : MEASURED_Q + 4], x)[1])
             sigma = math.sqrt(max(row[POINT_COV], row[POINT_COV + 4], row[POINT_COV + 8]))
-            rejected = Rejected(t, row[POINT : POINT + 3].copy(), found[2:5].copy(), turn, sigma)
-            agreed = self._candidates.add(rejected, self._sure(P, t))
+            rejected = Rejected(
+                t, row[POINT : POINT + 3].copy(), found[2:5].copy(), turn, sigma, row[ARM : ARM + 3].copy()
+            )
+            agreed = self._candidates[fix.kind].add(rejected, self._sure(P, t, fix.kind))
             if agreed is not None:
                 self._restart_from(agreed, fix)
                 return Verdict.ACCEPTED
         self._replay(i)
         return Verdict.GATE if acquired or not ours else Verdict.UNCONFIRMED
+
+    def learn_blob(self, fix: OpticalFix) -> None:
+        """A depth blob that is not needed, since the tag is seen, shows where on the shoe blobs lie."""
+        if implausible(fix) is None and self.begun and self.acquired and fix.t <= self._imu_t:
+            ankle, q, _, sd = self.predicted(fix.t)
+            if sd < SURE_SIGMA:
+                self._blob.learn(ankle, q, fix.head.p + rot.rotate(fix.head.q, fix.p))
 
     def move(self, p: Array, q: Array) -> None:
         """The stage moved, old to new: everything that is kept goes along."""
@@ -203,14 +212,14 @@ class InertialFilter:
         timeline.P[:n] = turn @ timeline.P[:n] @ turn.T
         # Fixes of the old stage are in the checkpoints already; none of them may be replayed.
         timeline.restart(int(timeline.t[n - 1]))
-        self._candidates.clear()
+        self._clear_candidates()
         self._seen.clear()
         self._lock[:] = 0.0
 
     def lose(self) -> None:
         """The stage moved and nobody knows how: the place needs fixes that agree."""
         self.acquired = False
-        self._candidates.clear()
+        self._clear_candidates()
         self._seen.clear()
         if self._timeline.n:
             last = self._timeline.restart(int(self._timeline.t[self._timeline.n - 1]))
@@ -254,10 +263,10 @@ class InertialFilter:
         self._last: Array = np.zeros(1)
         self._q: Array | None = None
         self.acquired, self._seen_yaw = False, False
-        self._candidates = Candidates()
+        self._candidates: dict[Kind, Candidates] = {"marker": Candidates(), "depth": Candidates()}
+        self._fix_t: dict[Kind, int] = {}
         self._seen: deque[tuple[int, Array]] = deque(maxlen=64)
         self._drift = 0.0
-        self._fix_t: int | None = None
 
     def _begin(self, sample: ImuSample) -> None:
         norm = float(np.linalg.norm(sample.acc))
@@ -318,11 +327,18 @@ class InertialFilter:
         x = self._timeline.X[i]
         return rows[j, GYRO : GYRO + 3] - x[13:16] if rows[j, KIND] == IMU else self._last[GYRO : GYRO + 3] - x[13:16]
 
-    def _accept(self, i: int, t: int) -> None:
+    def _clear_candidates(self) -> None:
+        for candidates in self._candidates.values():
+            candidates.clear()
+
+    def _accept(self, i: int, t: int, kind: Kind) -> None:
         timeline = self._timeline
         row = timeline.rows[i]
         row[ACCEPTED] = 1.0
-        self._fix_t = t
+        self._fix_t[kind] = t
+        self._candidates["depth"].clear()
+        if kind == "marker":
+            self._candidates["marker"].clear()
         self._see(t, row[POINT : POINT + 3].copy())
         if self._drift > 0.0:
             for j in range(i + 1, timeline.n):
@@ -346,8 +362,10 @@ class InertialFilter:
             if speed > SLOPE_NOISE:
                 self._drift = speed
 
-    def _sure(self, P: Array, t: int) -> bool:
-        if not self.acquired or self._fix_t is None or (t - self._fix_t) * 1e-9 > 3.0 * SURE_AGE_S:
+    def _sure(self, P: Array, t: int, kind: Kind) -> bool:
+        """Whether the foot knows its place so well that fixes of this kind must insist. A blob never outdoes a tag."""
+        by = [self._fix_t[k] for k in (("marker",) if kind == "marker" else self._fix_t) if k in self._fix_t]
+        if not self.acquired or not by or (t - max(by)) * 1e-9 > SURE_AGE_S:
             return False
         return math.sqrt(max(P[0, 0], P[1, 1], P[2, 2])) < SURE_SIGMA
 
@@ -363,6 +381,7 @@ class InertialFilter:
         row[KIND] = RESET
         row[POINT : POINT + 3] = first.point
         span = (last.t - first.t) * 1e-9
+        row[ARM : ARM + 3] = first.arm
         row[SPEED : SPEED + 3] = (last.point - first.point) / span
         row[POINT_SIGMA] = 0.03
         row[SPEED_SIGMA] = 0.5 + 3.0 * first.sigma / span
@@ -384,7 +403,7 @@ class InertialFilter:
                 timeline.rows[j, ACCEPTED] = 1.0
         self._replay(i)
         self.acquired = True
-        self._fix_t = last.t
+        self._fix_t[fix.kind] = last.t
         self._seen.clear()
         self._drift = 0.0
         self._lock[:] = 0.0
@@ -397,6 +416,6 @@ class InertialFilter:
         self._timeline.P[0, range(3, 6), range(3, 6)] += 1.0
         self._memory[:] = 0.0
         self.acquired = False
-        self._candidates.clear()
+        self._clear_candidates()
         self._seen.clear()
         self._q = None

@@ -12,6 +12,7 @@ from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings
 from foottrack_service.fusion.compiled import compiled
 from foottrack_service.fusion.foot_filter_events import (
+    ARM,
     MEASURED_Q,
     NORMAL,
     PLACED_DELAY,
@@ -20,7 +21,7 @@ from foottrack_service.fusion.foot_filter_events import (
     TURN_SIGMA,
 )
 from foottrack_service.fusion.foot_filter_kernel import NE, invert3
-from foottrack_service.fusion.foot_filter_replay import MARKER_ARM, attitude_error, point_model
+from foottrack_service.fusion.foot_filter_replay import attitude_error, point_model
 from foottrack_service.fusion.interface import OpticalFix, Verdict
 from foottrack_service.rotations import Array
 
@@ -42,6 +43,12 @@ TILT_USABLE = 0.45
 """rad: a tag's attitude that leans more against gravity is not used."""
 TILT_IMPOSSIBLE = 0.9
 """rad: and beyond this it is not our tag, wherever it is."""
+BLOB_SIGMA = 0.025
+"""m per axis: shoes and views differ."""
+BLOB_WANDER = 0.01
+"""m per axis: as other parts of the shoe come into view; the same for many pictures."""
+BLOB_CORRELATED = 20.0
+"""Pictures after which a blob says something new."""
 
 
 def implausible(fix: OpticalFix) -> Verdict | None:
@@ -56,11 +63,35 @@ def implausible(fix: OpticalFix) -> Verdict | None:
     return None
 
 
+class Blob:
+    """Where on the foot the depth camera's blob has its middle: halfway to the toes until both were seen together."""
+
+    def __init__(self, foot: FootSettings) -> None:
+        self.point: Array = 0.5 * np.array(foot.toe.p)
+        """Foot frame, m."""
+        self._n = 0
+
+    @property
+    def sigma(self) -> float:
+        """m per axis."""
+        return math.hypot(BLOB_SIGMA / math.sqrt(1.0 + self._n / BLOB_CORRELATED), BLOB_WANDER)
+
+    def learn(self, ankle: Array, foot_q: Array, seen: Array) -> None:
+        """A blob was seen at ``seen`` while the foot's pose was known by its tag."""
+        offset = rot.unrotate(foot_q, seen - ankle) - self.point
+        if float(offset @ offset) < (3.0 * BLOB_SIGMA) ** 2:
+            self._n = min(self._n + 1, 600)
+            self.point = self.point + offset / (BLOB_CORRELATED + self._n)
+
+
 class FixRows:
     """Turns fixes into the timeline's rows for one shoe."""
 
-    def __init__(self, foot: FootSettings, imu_q: Array) -> None:
+    def __init__(self, foot: FootSettings, imu_p: Array, imu_q: Array, blob: Blob) -> None:
         self._target_to_sensor = rot.multiply(rot.conjugate(imu_q), np.array(foot.marker.q))
+        self._arm = rot.unrotate(imu_q, np.array(foot.marker.p) - imu_p)
+        self._imu_p, self._imu_q = imu_p, imu_q
+        self._blob = blob
 
     def fill(self, row: Array, fix: OpticalFix, delay: float) -> list[Array]:
         """Write place and noise into ``row``; returns the sensor's attitudes that the tag allows, best first."""
@@ -68,6 +99,10 @@ class FixRows:
         row[POINT : POINT + 3] = fix.head.p + matrix @ fix.p
         distance2 = float(fix.p @ fix.p)
         noise = HEAD_NOISE**2 + HEAD_TURN_NOISE**2 * distance2
+        row[ARM : ARM + 3] = self._arm
+        if fix.kind == "depth":
+            row[ARM : ARM + 3] = rot.unrotate(self._imu_q, self._blob.point - self._imu_p)
+            noise += self._blob.sigma**2
         row[POINT_COV : POINT_COV + 9] = (matrix @ fix.cov @ matrix.T + noise * np.eye(3)).ravel()
         row[PLACED_DELAY] = delay
         found = []
@@ -102,14 +137,14 @@ class FixRows:
 
 
 @compiled
-def judged(row: Array, x: Array, P: Array, rate: Array, geometry: Array) -> Array:
+def judged(row: Array, x: Array, P: Array, rate: Array) -> Array:
     """A fix against the state at its instant.
 
     Shape (5,): squared Mahalanobis distances of its place and of its turn, and the place's residual (3, m).
     """
     out = np.zeros(5)
     h, H = np.empty(3), np.empty((3, NE))
-    point_model(x, geometry[MARKER_ARM : MARKER_ARM + 3], rate, x[16] - row[PLACED_DELAY], h, H)
+    point_model(x, row[ARM : ARM + 3], rate, x[16] - row[PLACED_DELAY], h, H)
     S = H @ P @ H.T + row[POINT_COV : POINT_COV + 9].copy().reshape(3, 3)
     inverse = np.empty((3, 3))
     residual = row[POINT : POINT + 3] - h
@@ -133,6 +168,7 @@ class Rejected:
     turn: float | None
     """Yaw by which the tag's attitude differs from ours, rad."""
     sigma: float
+    arm: Array
 
 
 SPAN_S = 0.12

@@ -13,6 +13,7 @@ from foottrack_service.fusion.compiled import compiled
 from foottrack_service.fusion.foot_filter_events import (
     ACC,
     ACCEPTED,
+    ARM,
     CLIPPED,
     FLOOR,
     GYRO,
@@ -47,8 +48,8 @@ from foottrack_service.fusion.foot_filter_kernel import (
 )
 from foottrack_service.rotations import Array
 
-# geometry, shape (9,), sensor frame
-MARKER_ARM, ANKLE_ARM, FOOT_UP = 0, 3, 6
+# geometry, shape (6,), sensor frame
+ANKLE_ARM, FOOT_UP = 0, 3
 
 HOLE_S = 0.1
 """A longer silence of the IMU is not integrated across."""
@@ -92,9 +93,9 @@ def replay(t: Array, rows: Array, X: Array, P: Array, start: int, end: int, geom
         if kind == IMU:
             _inertial_updates(rows[i], X[i], P[i], min(dt, HOLE_S), geometry)
         elif kind == RESET:
-            _reset(rows[i], X[i], P[i], geometry)
+            _reset(rows[i], X[i], P[i])
         elif rows[i, ACCEPTED] == 1.0:
-            fix_updates(rows[i], X[i], P[i], _rate(rows, X[i], i, end), geometry)
+            fix_updates(rows[i], X[i], P[i], _rate(rows, X[i], i, end))
         floor_covariance(P[i], smallest)
 
 
@@ -151,10 +152,10 @@ def attitude_error(q: Array, x: Array) -> Array:
 
 
 @compiled
-def fix_updates(row: Array, x: Array, P: Array, rate: Array, geometry: Array) -> None:
+def fix_updates(row: Array, x: Array, P: Array, rate: Array) -> None:
     """An accepted fix: the target's place and, where it has one, its turn about the target's face."""
     h, H = np.empty(3), np.empty((3, NE))
-    point_model(x, geometry[MARKER_ARM : MARKER_ARM + 3], rate, x[16] - row[PLACED_DELAY], h, H)
+    point_model(x, row[ARM : ARM + 3], rate, x[16] - row[PLACED_DELAY], h, H)
     S = row[POINT_COV : POINT_COV + 9].copy().reshape(3, 3)
     update3(x, P, H, row[POINT : POINT + 3] - h, S, np.inf)
     if row[TURN_SIGMA] > 0.0:
@@ -283,7 +284,7 @@ def _level(up: Array, variance: float, x: Array, P: Array) -> None:
 
 
 @compiled
-def _reset(row: Array, x: Array, P: Array, geometry: Array) -> None:
+def _reset(row: Array, x: Array, P: Array) -> None:
     """A new start of place, speed and yaw; tilt and biases stay."""
     if row[TURN_SIGMA] > 0.0:
         # The twist about up of the turn from the state's attitude to the measured one.
@@ -293,7 +294,7 @@ def _reset(row: Array, x: Array, P: Array, geometry: Array) -> None:
         turn_stage(x[6:10], 0.0, 2.0 * math.atan2(y, w), 0.0)
     R = np.empty((3, 3))
     rotation(x[6:10], R)
-    r = turned(R, geometry[MARKER_ARM : MARKER_ARM + 3])
+    r = turned(R, row[ARM : ARM + 3])
     for k in range(3):
         x[k] = row[POINT + k] - r[k]
         x[3 + k] = row[SPEED + k]
