@@ -1,15 +1,15 @@
 """One foot's motion from a plan of steps.
 
 In stance a foot turns without slipping: about the heel after the strike, not at all while it is flat, over the ball and
-the toes after the heel has left. In between the ankle flies on quintics whose ends have the position, velocity and acceleration
-of the turning foot, so the specific force is continuous throughout.
+the toes after the heel has left. In between the ankle flies on quintics whose ends have the position, velocity and
+acceleration of the turning foot, so the specific force is continuous throughout.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import BPoly
@@ -145,8 +145,8 @@ def _take(foot: FootSamples, old: Place, step: Step, sole: Sole) -> None:
     forward, up = _over_heel(sole, foot.pitch[lands])
     foot.p[lands] = _in_stage(new, np.stack([forward - sole.heel_z, up], axis=-1))
 
-    take_off = _turning(*toes.ankle(off[0]), toes.contact(off[0]), toes.radius(off[0]), off)
-    touch_down = _turning(*_over_heel(sole, on[0]), (-sole.heel_z, sole.ankle_height), 0.0, on)
+    take_off = _turning(toes.ankle(off[0]), toes.contact(off[0]), toes.radius(off[0]), off)
+    touch_down = _turning(_over_heel(sole, on[0]), (-sole.heel_z, sole.ankle_height), 0.0, on)
     take_off[0] += [sole.ball_z, 0.0]
     touch_down[0] += [-sole.heel_z, 0.0]
     ends = np.array(
@@ -174,10 +174,10 @@ def _over_heel(sole: Sole, pitch: Array) -> tuple[Array, Array]:
     return sole.ankle_height * sine + sole.heel_z * cosine, sole.ankle_height * cosine - sole.heel_z * sine
 
 
-def _turning(forward: float, up: float, contact: tuple[float, float], radius: float, pitch: Array) -> Array:
+def _turning(ankle: tuple[Any, Any], contact: tuple[Any, Any], radius: float, pitch: Array) -> Array:
     """(3, 2): the ankle's forward and up, and their derivatives, on a sole that rolls with `pitch` (angle and its two
     derivatives) about a contact (ahead, below: foot frame, m)."""
-    angle, rate, acceleration = pitch
+    (forward, up), (angle, rate, acceleration) = ankle, pitch
     from_contact = contact[1] * np.sin(angle) - contact[0] * np.cos(angle)
     tangent = np.array([up, -from_contact])
     bend = np.array([-from_contact, radius - up])

@@ -50,7 +50,7 @@ class Rocker:
     def radius(self, pitch: float) -> float:
         """Radius of curvature at the contact."""
         share = min(max(pitch / self._end, 0.0), 1.0)
-        return self._length * 30.0 * share**2 * (1.0 - share) ** 2 / self._end
+        return float(self._length * 30.0 * share**2 * (1.0 - share) ** 2 / self._end)
 
 
 @lru_cache(maxsize=16)

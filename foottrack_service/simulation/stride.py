@@ -12,9 +12,7 @@ from foottrack_service.simulation.footsteps import Place, Step, Style
 
 CAUTIOUS = Style(swing=0.55, roll=0.25, settle=0.12, toe_off_pitch=0.5, toe_off_rate=1.5, strike_pitch=-0.15, lift=0.06)
 """Single steps in a room, with a headset on."""
-WALKING = Style(
-    swing=0.44, roll=0.28, settle=0.09, toe_off_pitch=0.95, toe_off_rate=4.0, strike_pitch=-0.35, lift=0.045
-)
+WALKING = Style(swing=0.44, roll=0.28, settle=0.09, toe_off_pitch=0.95, toe_off_rate=4.0, strike_pitch=-0.35, lift=0.05)
 """A free walk: swing 40 % of 1.10 s; the heel's rise and the pitch at the strike as in Winter's foot angles."""
 IN_PLACE = Style(swing=0.42, roll=0.14, settle=0.08, toe_off_pitch=0.45, toe_off_rate=2.0, strike_pitch=0.0, lift=0.12)
 """Walking in place: the foot comes down flat."""
