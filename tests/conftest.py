@@ -23,6 +23,11 @@ T = TypeVar("T")
 Run = Callable[[Coroutine[Any, Any, T]], T]
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """``--update-golden``: write the golden results of tests/replay anew."""
+    parser.addoption("--update-golden", action="store_true", help="write the golden results of tests/replay anew")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _selector_loop() -> None:
     """Windows: pyzmq's descriptors need the selector loop, as in the service."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from foottrack_service.recording.compare import Comparison
 from foottrack_service.recording.info import RecordingInfo
@@ -25,9 +25,10 @@ def show_info(found: RecordingInfo) -> None:
         begun = f", begun {moment:%Y-%m-%d %H:%M:%S}"
     settings = "carries its settings" if found.has_config else "carries no settings"
     each = f" ({found.file_bytes / found.messages:.0f} bytes a message)" if found.messages else ""
-    console.print(f"{found.path}: {found.format}, {found.file_bytes / 1e6:.2f} MB{each}{begun}, {settings}")
+    size = f"{found.file_bytes / 1e6:.2f} MB{each}"
+    console.print(f"{found.path}: {found.format}, {size}{begun}, {settings}", soft_wrap=True)
     console.print(f"{found.messages} messages in {found.duration_s:.1f} s")
-    table = Table("topic", "messages", "Hz", "lost", "invalid", "longest gap", "from")
+    table = Table(Column("topic", no_wrap=True), "messages", "Hz", "lost", "invalid", "longest gap", "from")
     for name, entry in sorted(found.topics.items()):
         hz = "" if entry.hz is None else f"{entry.hz:.1f}"
         bad = entry.invalid + sum(entry.undecodable.values())
@@ -36,7 +37,7 @@ def show_info(found: RecordingInfo) -> None:
         table.add_row(name, str(entry.messages), hz, str(entry.lost), f"{bad}{reasons}", gap, ", ".join(entry.sources))
     console.print(table)
     for name, values in sorted(found.calibration.items()):
-        console.print(f"calibration {name}: {values}")
+        console.print(f"calibration {name}: {values}", soft_wrap=True)
 
 
 def show_comparison(found: Comparison) -> None:
