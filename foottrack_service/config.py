@@ -19,6 +19,7 @@ from pydantic_settings import BaseSettings, EnvSettingsSource, PydanticBaseSetti
 from foottrack_protocol.frames import TAG_ON_INSTEP
 from foottrack_protocol.messages import Float, Quat, Side, Vec3
 from foottrack_protocol.topics import DEFAULT_USER, is_user
+from foottrack_service.camera.settings import SourceSettings
 from foottrack_service.imu.settings import ImuSettings
 
 DEFAULT_FILE = Path("foottrack.toml")
@@ -112,8 +113,11 @@ class CameraSettings(Section):
         default=Placement(p=(0.0, 0.0, -0.08), q=(-0.17364817766693033, 0.0, 0.0, 0.984807753012208)),
         description="camera (-Z into the picture, +Y up) to head: 20 deg down",
     )
-    dictionary: str = "DICT_4X4_50"
+    dictionary: str | Annotated[tuple[str, ...], Field(min_length=1)] = Field(
+        default="DICT_4X4_50", description="OpenCV's name, GENERATED_3X3_4, or the tags' cells as strings of 0 and 1"
+    )
     targets: TargetsSettings = TargetsSettings()
+    source: SourceSettings = SourceSettings()
 
     @property
     def mount_hash(self) -> str:

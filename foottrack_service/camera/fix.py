@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
+from foottrack_protocol.messages import Optical
 from foottrack_service.rotations import Array
 
 
@@ -32,19 +33,18 @@ class Fix:
     outline: Array
     label: str
 
-    def body(self) -> dict[str, Any]:
-        """The message's `data`, in plain floats."""
-        upper = self.cov[np.triu_indices(3)]
-        return {
-            "p": self.p.tolist(),
-            "q": None if self.q is None else self.q.tolist(),
-            "q_alt": None if self.q_alt is None else self.q_alt.tolist(),
-            "cov": upper.tolist(),
-            "size_ratio": self.size_ratio,
-            "reproj_px": self.reproj_px,
-            "edge_px": self.edge_px,
-            "frame": self.frame,
-        }
+    def body(self) -> Optical:
+        """The message's `data`. Raises ValueError (pydantic's) for what the wire does not take."""
+        return Optical(
+            p=tuple(self.p.tolist()),
+            q=None if self.q is None else tuple(self.q.tolist()),
+            q_alt=None if self.q_alt is None else tuple(self.q_alt.tolist()),
+            cov=tuple(self.cov[np.triu_indices(3)].tolist()),
+            size_ratio=self.size_ratio,
+            reproj_px=self.reproj_px,
+            edge_px=self.edge_px,
+            frame=self.frame,
+        )
 
 
 def edge_distance(outline: Array, width: int, height: int) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from foottrack_service import rotations
+from foottrack_service.camera.settings import DISTORTION_LENGTHS
 from foottrack_service.rotations import Array
 
 CV_TO_CAMERA: Array = np.array([1.0, 0.0, 0.0, 0.0])
@@ -47,7 +48,7 @@ class Intrinsics:
             raise ValueError("focal lengths must be positive and all intrinsics finite")
         if self.width <= 0 or self.height <= 0:
             raise ValueError(f"a picture of {self.width} x {self.height} px is none")
-        if len(self.distortion) not in (0, 4, 5, 8, 12, 14):
+        if len(self.distortion) not in DISTORTION_LENGTHS:
             raise ValueError(f"OpenCV knows 0, 4, 5, 8, 12 or 14 distortion coefficients, not {len(self.distortion)}")
         matrix = np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
         object.__setattr__(self, "matrix", matrix)

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from foottrack_service.camera.rig import D435_COLOUR, Intrinsics
+if TYPE_CHECKING:
+    from foottrack_service.camera.rig import Intrinsics
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
 Pixels = Annotated[int, Field(gt=0, le=10000)]
+
+
+DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+"""How many coefficients OpenCV's models have."""
 
 
 class _Section(BaseModel):
@@ -20,24 +26,27 @@ class _Section(BaseModel):
 class LensSettings(_Section):
     """What `calibrate camera` finds, px; OpenCV's distortion coefficients."""
 
-    width: Pixels = D435_COLOUR.width
-    height: Pixels = D435_COLOUR.height
-    fx: Positive = D435_COLOUR.fx
-    fy: Positive = D435_COLOUR.fy
-    cx: float = D435_COLOUR.cx
-    cy: float = D435_COLOUR.cy
-    distortion: tuple[float, ...] = ()
+    width: Pixels = 848
+    height: Pixels = 480
+    fx: Positive = 612.0
+    fy: Positive = 612.0
+    cx: Finite = 423.5
+    cy: Finite = 239.5
+    distortion: tuple[Finite, ...] = ()
 
-    @model_validator(mode="after")
-    def _is_a_lens(self) -> LensSettings:
-        self.intrinsics()
-        return self
+    @field_validator("distortion")
+    @classmethod
+    def _is_a_model(cls, distortion: tuple[float, ...]) -> tuple[float, ...]:
+        if len(distortion) not in DISTORTION_LENGTHS:
+            raise ValueError(f"0, 4, 5, 8, 12 or 14 coefficients, not {len(distortion)}")
+        return distortion
 
     def intrinsics(self) -> Intrinsics:
         """As the trackers take it."""
-        return Intrinsics(
-            self.width, self.height, self.fx, self.fy, self.cx, self.cy, tuple(float(c) for c in self.distortion)
-        )
+        # Settings are read by every command; OpenCV is loaded by those that look at pictures.
+        from foottrack_service.camera.rig import Intrinsics
+
+        return Intrinsics(self.width, self.height, self.fx, self.fy, self.cx, self.cy, self.distortion)
 
 
 class RealSenseSettings(_Section):
@@ -75,6 +84,8 @@ class RenderedSettings(_Section):
 
     task: str = Field(default="steps", description="what the simulated person does")
     seed: int = 0
+    seconds: Positive | None = Field(default=None, description="how long; the task's own length unless given")
+    feet: Literal["mild", "hard"] = "mild"
     fps: Positive = 60.0
     readout: NotNegative = 0.010
     latency: NotNegative = Field(default=0.030, description="exposure to the picture's arrival, s")
@@ -85,6 +96,7 @@ class SourceSettings(_Section):
     """Where pictures come from."""
 
     kind: Literal["none", "realsense", "opencv", "folder", "rendered"] = "none"
+    preview: bool = Field(default=False, description="publish camera/preview, at most 5 pictures a second")
     exposure: Annotated[float, Field(gt=0.0, le=0.1)] = Field(
         default=0.003, description="s; above 3 ms, walking feet blur"
     )

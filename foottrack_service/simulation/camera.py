@@ -146,8 +146,10 @@ def hidden(truth: Truth, points: Array, camera: Eye, settings: Settings) -> Flag
     return behind
 
 
-def cells_across(dictionary: str) -> int:
-    """Cells of a tag from border to border, by the dictionary's name; 4x4 and a border where it does not say."""
+def cells_across(dictionary: str | Sequence[str]) -> int:
+    """Cells of a tag from border to border, by the dictionary's name, or by its own tags written out row by row."""
+    if not isinstance(dictionary, str):
+        return math.isqrt(len(dictionary[0])) + 2
     named = re.search(r"(\d)X\d", dictionary)
     if named is not None:
         return int(named[1]) + 2
