@@ -13,7 +13,7 @@ from typing import Any
 
 from foottrack_protocol.messages import CameraPreview
 from foottrack_service.bus.connection import Bus
-from foottrack_service.camera.worker import Ended, Fixes, Opened, Report, work
+from foottrack_service.camera.process import Ended, Fixes, Opened, Report, work
 from foottrack_service.config import Settings
 
 SOURCE = "camera"
