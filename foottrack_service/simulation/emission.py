@@ -89,6 +89,7 @@ def head_emission(samples: HeadSamples) -> Emission:
     """``head/pose``."""
     p, q, origin = samples.p.tolist(), samples.q.tolist(), samples.origin.tolist()
     tracked = samples.tracked.tolist()
+    first = {origin.index(number) for number in range(1, len(samples.stages)) if number in origin}
     moves = [None if s.moved is None else Pose(p=s.moved[0].tolist(), q=s.moved[1].tolist()) for s in samples.stages]
 
     def body(i: int, start: int) -> HeadPose:
@@ -98,7 +99,7 @@ def head_emission(samples: HeadSamples) -> Emission:
             q=q[i] if known else None,
             tracked=known,
             origin=origin[i],
-            moved=moves[origin[i]],
+            moved=moves[origin[i]] if i in first else None,
         )
 
     return Emission("head/pose", "headset", _ns(samples.t), _ns(samples.t_arr + _HAND_OVER_S), body)

@@ -227,3 +227,4 @@ def test_dictionaries_say_their_cells() -> None:
     assert camera.cells_across("DICT_4X4_50") == 6
     assert camera.cells_across("GENERATED_3X3_4") == 5
     assert camera.cells_across("DICT_APRILTAG_36h11") == 8
+    assert camera.cells_across(("101010101", "010101010")) == 5
