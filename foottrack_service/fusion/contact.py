@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from foottrack_service.fusion.compiled import compiled
-from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND
+from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE
 from foottrack_service.fusion.foot_filter_kernel import GRAVITY
 from foottrack_service.rotations import Array
 
@@ -38,27 +40,38 @@ PEAK, STATISTIC = 0, 1
 
 @compiled
 def stillness(t: Array, rows: Array, i: int) -> float:
-    """The statistic over the window that ends at the IMU row i (0: as still as can be); inf before there is one."""
+    """The statistic over the window that ends at the IMU row i (0: as still as can be); inf before there is one.
+
+    Rates that are differences of a device's own attitude carry its corrections: they are averaged over half a window.
+    """
     n = 0
-    mean0, mean1, mean2, square, rate = 0.0, 0.0, 0.0, 0.0, 0.0
+    mean, halves = np.zeros(3), np.zeros((2, 3))
+    counts = np.zeros(2)
+    square, rate = 0.0, 0.0
     j = i
     while j >= 0 and t[i] - t[j] <= WINDOW_NS:
         if rows[j, KIND] == IMU:
-            a0, a1, a2 = rows[j, ACC], rows[j, ACC + 1], rows[j, ACC + 2]
-            w0, w1, w2 = rows[j, GYRO], rows[j, GYRO + 1], rows[j, GYRO + 2]
-            mean0 += a0
-            mean1 += a1
-            mean2 += a2
-            square += a0 * a0 + a1 * a1 + a2 * a2
-            rate += w0 * w0 + w1 * w1 + w2 * w2
+            half = 0 if t[i] - t[j] < WINDOW_NS // 2 else 1
+            for k in range(3):
+                a, w = rows[j, ACC + k], rows[j, GYRO + k]
+                mean[k] += a
+                square += a * a
+                halves[half, k] += w
+                rate += w * w
+            counts[half] += 1.0
             n += 1
         j -= 1
     if j < 0 or n < LEAST_SAMPLES:
         return math.inf
-    mean0, mean1, mean2 = mean0 / n, mean1 / n, mean2 / n
-    norm2 = mean0 * mean0 + mean1 * mean1 + mean2 * mean2
+    norm2 = (mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2]) / (n * n)
     spread2 = max(0.0, square / n - norm2)
     off = math.sqrt(norm2) - GRAVITY
+    if rows[i, MEAN_RATE] == 1.0:
+        rate = 0.0
+        for half in range(2):
+            if counts[half] > 0.0:
+                for k in range(3):
+                    rate += halves[half, k] ** 2 / counts[half]
     return math.sqrt((spread2 + off * off) / FORCE_SPREAD**2 + rate / n / RATE**2)
 
 

@@ -33,6 +33,10 @@ GYRO_NOISE = 0.001
 """rad/s/sqrt(Hz)."""
 GYRO_SCALE = 0.0005
 """1/sqrt(Hz), per rad/s: scale factor and misalignment."""
+FUSED_TILT = 0.02
+"""rad/sqrt(s) that a device's own idea of what is upright adds while it moves: 1.4 deg that change within 2 s."""
+FULL_EFFORT = 5.0
+"""m/s^2 beyond gravity at which all of that is there."""
 ACC_BIAS_WALK = 0.0005
 """m/s^2/sqrt(s)."""
 GYRO_BIAS_WALK = 0.00002
@@ -82,11 +86,13 @@ def turn_stage(q: Array, rx: float, ry: float, rz: float) -> None:
 
 
 @compiled
-def propagate(x: Array, P: Array, acc: Array, gyro: Array, step: float, clipped: bool, dt: float) -> None:
+def propagate(
+    x: Array, P: Array, acc: Array, gyro: Array, step: float, clipped: bool, fused: bool, dt: float
+) -> None:
     """Carry x and P forward by dt, s, in place.
 
     ``acc`` (m/s^2) and ``gyro`` (rad/s), shape (3,), are means over the interval, ``step`` (m/s^2) is how far the
-    specific force moved within it.
+    specific force moved within it. ``fused``: the rate is the increment of the device's own attitude.
     """
     q = x[6:10]
     fx, fy, fz = acc[0] - x[10], acc[1] - x[11], acc[2] - x[12]
@@ -145,13 +151,16 @@ def propagate(x: Array, P: Array, acc: Array, gyro: Array, step: float, clipped:
     rate = math.sqrt(wx * wx + wy * wy + wz * wz)
     sigma_a = ACC_NOISE + ACC_SCALE * felt + ACC_STEP * step + (ACC_CLIPPED if clipped else 0.0)
     sigma_w = GYRO_NOISE + GYRO_SCALE * rate
-    qa, qw = sigma_a * sigma_a * dt, sigma_w * sigma_w * dt
+    sigma_yaw = sigma_w
+    if fused:
+        sigma_w += FUSED_TILT * min(1.0, felt / FULL_EFFORT)
+    qa = sigma_a * sigma_a * dt
     for i in range(3):
         P[i, i] += qa * dt * dt / 3.0
         P[i, 3 + i] += qa * dt / 2.0
         P[3 + i, i] += qa * dt / 2.0
         P[3 + i, 3 + i] += qa
-        P[6 + i, 6 + i] += qw
+        P[6 + i, 6 + i] += dt * (sigma_yaw * sigma_yaw if i == 1 else sigma_w * sigma_w)
         P[9 + i, 9 + i] += ACC_BIAS_WALK * ACC_BIAS_WALK * dt
         P[12 + i, 12 + i] += GYRO_BIAS_WALK * GYRO_BIAS_WALK * dt
     P[15, 15] += DELAY_WALK * DELAY_WALK * dt

@@ -67,8 +67,10 @@ FLOOR_LEAN = 0.9
 """Cosine: a foot that leans more stands on its heel or toes, and the ankle's height says nothing."""
 BIAS_SIGMA = 0.01
 """rad/s per 10 ms: how little a quiet foot turns."""
-UP_SIGMA = 0.05
-"""rad: the device's own tilt, the same error for about a second."""
+UP_SIGMA = 0.04
+"""rad: the device's own tilt."""
+UP_CORRELATED_S = 2.0
+"""For so long it has the same error."""
 LEVEL_SIGMA = 0.05
 """rad: the tilt of the specific force of a foot at rest."""
 LEVEL_BELOW = 0.05
@@ -212,7 +214,7 @@ def _advance(rows: Array, x: Array, P: Array, i: int, end: int, dt: float) -> No
         step += (a1 - a0) * (a1 - a0)
     if dt <= HOLE_S:
         clipped = rows[before, CLIPPED] == 1.0 or rows[after, CLIPPED] == 1.0
-        propagate(x, P, acc, gyro, math.sqrt(step), clipped, dt)
+        propagate(x, P, acc, gyro, math.sqrt(step), clipped, rows[after, MEAN_RATE] == 1.0, dt)
         return
     own_attitude = rows[after, MEAN_RATE] == 1.0
     if own_attitude:
@@ -265,7 +267,7 @@ def _inertial_updates(row: Array, x: Array, P: Array, dt: float, geometry: Array
         if max(P[6, 6], P[8, 8]) > LEVEL_BELOW**2:
             _level(row[ACC : ACC + 3] / GRAVITY, LEVEL_SIGMA**2 * 0.1 / dt, x, P)
     if row[UP] != 0.0 or row[UP + 1] != 0.0 or row[UP + 2] != 0.0:
-        _level(row[UP : UP + 3], UP_SIGMA**2 * 1.0 / dt, x, P)
+        _level(row[UP : UP + 3], UP_SIGMA**2 * UP_CORRELATED_S / dt, x, P)
 
 
 @compiled
