@@ -24,6 +24,9 @@ from foottrack_service.config import BusSettings
 
 SUBSCRIBE_ALL = b"\x01"
 UNSUBSCRIBE_ALL = b"\x00"
+_HOLD = 10_000
+"""The ingress counts subscriptions, and the egress passes on to it whatever subscribers say: so many times one may take
+back a subscription to everything that it never made, before publishers would think that the bus is gone."""
 _STOP_TIMEOUT_S = 5.0
 
 
@@ -52,6 +55,9 @@ class Broker:
             raise BusError("this broker was started before; make a new one")
         ingress, egress, steering = (self._socket(kind) for kind in (zmq.XSUB, zmq.XPUB, zmq.PAIR))
         egress.setsockopt(zmq.XPUB_WELCOME_MSG, WELCOME)
+        # Not for what it tells: without it the socket swallows a repeated subscription that is a part of a longer
+        # message, and libzmq's proxy ends at the half message that remains.
+        egress.setsockopt(zmq.XPUB_VERBOSER, 1)
         try:
             actual = {
                 "ingress": bind(ingress, self.endpoints.ingress),
@@ -66,7 +72,8 @@ class Broker:
             raise
         self.endpoints = self.endpoints.model_copy(update=actual)
         # Before the proxy runs, so that no publisher meets an ingress that does not want everything.
-        ingress.send(SUBSCRIBE_ALL)
+        for _ in range(_HOLD):
+            ingress.send(SUBSCRIBE_ALL)
         self._threads = [
             threading.Thread(target=self._proxy, args=(ingress, egress, steering), name="bus-proxy", daemon=True),
             threading.Thread(target=self._greet, name="bus-greeter", daemon=True),
@@ -117,8 +124,9 @@ class Broker:
         greeter.connect(self.inproc.ingress)
         asked = SUBSCRIBE_ALL + WELCOME + b"/"
         with contextlib.suppress(zmq.ContextTerminated):
-            # The unsubscription comes of itself when the ingress closes.
-            while (frames := greeter.recv_multipart()) != [UNSUBSCRIBE_ALL]:
-                if len(frames) == 1 and frames[0].startswith(asked):
-                    greeter.send(frames[0][1:])
+            # Frame by frame: what is part of a longer message may lack the rest. The unsubscription comes of itself
+            # when the ingress closes.
+            while (frame := greeter.recv()) != UNSUBSCRIBE_ALL:
+                if frame.startswith(asked):
+                    greeter.send(frame[1:])
         greeter.close(0)

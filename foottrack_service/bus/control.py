@@ -11,6 +11,7 @@ from typing import Any
 import zmq
 from pydantic import ConfigDict, ValidationError, validate_call
 
+from foottrack_protocol.control import COMMANDS, Code
 from foottrack_protocol.envelope import pack_map, unpack_map
 from foottrack_protocol.errors import DecodeError, EncodeError
 from foottrack_protocol.messages import Health, Session
@@ -22,8 +23,9 @@ from foottrack_service.bus.session import SessionInfo
 from foottrack_service.bus.watch import SocketWatch
 
 Handler = Callable[..., Any]
-"""A function or coroutine function with typed keyword arguments: they are the request's ``args``, checked by type
-(pydantic, strict). It gives what msgpack can carry, or a body. ControlError is answered as it is raised."""
+"""A function or coroutine function whose typed keyword arguments are the request's ``args``, checked against the
+protocol's registry and the types (pydantic, strict). It gives what msgpack can carry, or a body. ControlError is
+answered as it is raised."""
 
 MAX_WAITING = 64
 """Requests whose handlers wait at the same time; more are answered "busy"."""
@@ -35,8 +37,7 @@ _log = logging.getLogger(__name__)
 class ControlServer:
     """Answers requests; ``hello``, ``time`` and ``status`` by itself. Whatever comes in gets an answer.
 
-    Codes: "bad_request" (not a request), "unknown_command", "bad_arguments", "busy", "internal", and what handlers
-    raise.
+    Its own codes are BAD_REQUEST, UNKNOWN_COMMAND, BAD_ARGUMENTS, BUSY and INTERNAL of foottrack_protocol.control.
     """
 
     def __init__(
@@ -109,12 +110,14 @@ class ControlServer:
             handler = self._handlers.get(cmd)
             if handler is None:
                 known = ", ".join(sorted(self._handlers))
-                raise ControlError("unknown_command", f"no command is called {cmd[:100]!r}; there are: {known}")
+                raise ControlError(Code.UNKNOWN_COMMAND, f"no command is called {cmd[:100]!r}; there are: {known}")
             if self._waiting >= MAX_WAITING:
-                raise ControlError("busy", f"{self._waiting} requests wait already")
+                raise ControlError(Code.BUSY, f"{self._waiting} requests wait already")
+            if cmd in COMMANDS:
+                COMMANDS[cmd].args.model_validate(args)
             result = handler(**args)
         except ValidationError as error:
-            return _failure("bad_arguments", "; ".join(_detail(item) for item in error.errors()))
+            return _failure(Code.BAD_ARGUMENTS, "; ".join(_detail(item) for item in error.errors()))
         except Exception as error:  # whatever a handler does, the client gets an answer
             return _explained(error)
         if inspect.isawaitable(result):
@@ -146,14 +149,14 @@ def _request(payload: bytes) -> tuple[str, dict[str, Any]]:
     try:
         request = unpack_map(payload)
     except DecodeError as error:
-        raise ControlError("bad_request", error.detail) from None
+        raise ControlError(Code.BAD_REQUEST, error.detail) from None
     cmd, args = request.get("cmd"), request.get("args")
     if not isinstance(cmd, str):
-        raise ControlError("bad_request", "cmd must be a string")
+        raise ControlError(Code.BAD_REQUEST, "cmd must be a string")
     if args is None:
         return cmd, {}
     if not isinstance(args, dict) or not all(isinstance(key, str) for key in args):
-        raise ControlError("bad_request", "args must be a map with strings as keys")
+        raise ControlError(Code.BAD_REQUEST, "args must be a map with strings as keys")
     return cmd, args
 
 
@@ -161,7 +164,7 @@ def _explained(error: Exception) -> dict[str, Any]:
     if isinstance(error, ControlError):
         return _failure(error.code, error.message)
     _log.error("a control request failed", exc_info=error)
-    return _failure("internal", f"{type(error).__name__}: {error}")
+    return _failure(Code.INTERNAL, f"{type(error).__name__}: {error}")
 
 
 def _failure(code: str, message: str) -> dict[str, Any]:

@@ -21,8 +21,8 @@ from foottrack_service.bus.watch import SocketWatch
 NO_BUS = "no_bus"
 FULL = "full"
 
-_FIRST = int(zmq.NOBLOCK | zmq.SNDMORE)
-_LAST = int(zmq.NOBLOCK)
+_NOBLOCK = int(zmq.NOBLOCK)
+_NOBLOCK_MORE = int(zmq.NOBLOCK | zmq.SNDMORE)
 
 
 class Publisher:
@@ -108,8 +108,8 @@ class Publisher:
             return False
         try:
             # XPUB takes a message's second frame whenever it took the first: its high-water mark counts messages.
-            self._socket.send(frames[0], _FIRST)
-            self._socket.send(frames[1], _LAST)
+            self._socket.send(frames[0], _NOBLOCK_MORE)
+            self._socket.send(frames[1], _NOBLOCK)
         except zmq.Again:
             self.drops[FULL] += 1
             return False
@@ -124,11 +124,12 @@ class Publisher:
 
     def _notice(self) -> None:
         while self._watch.has_input:
-            frames = self._socket.recv_multipart(zmq.NOBLOCK)
-            if frames == [SUBSCRIBE_ALL]:
+            # Frame by frame: what subscribers send comes up too, and a longer message may lack its end.
+            frame = self._socket.recv(_NOBLOCK)
+            if frame == SUBSCRIBE_ALL:
                 self._live = True
                 self.connections += 1
-            elif frames == [UNSUBSCRIBE_ALL]:
+            elif frame == UNSUBSCRIBE_ALL:
                 self._live = False
 
 

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from foottrack_protocol.messages import Health, Session
 from foottrack_service.bus import ControlClient, ControlError, ControlServer, ControlTimeout, ManualClock
-from foottrack_service.bus.control import MAX_WAITING
+from foottrack_service.bus.control import MAX_WAITING, Handler
 from foottrack_service.bus.endpoints import Context
 from foottrack_service.bus.health import HealthBoard
 from foottrack_service.bus.session import SessionInfo
@@ -36,7 +36,7 @@ class Service:
         self.gate = asyncio.Event()
         self.waiting = 0
         self.names: list[str] = []
-        handlers = {
+        handlers: dict[str, Handler] = {
             "record/start": self.record,
             "wait": self.wait,
             "refuse": self.refuse,
@@ -157,7 +157,7 @@ def test_a_handler_that_waits_does_not_hold_up_others(
         await until(lambda: service.waiting == MAX_WAITING)
         assert (await failure(client, "wait", {"number": 0}))[0] == "busy"
         service.gate.set()
-        answers = []
+        answers: list[int] = []
         while len(answers) < MAX_WAITING:
             await asyncio.sleep(0)
             while dealer.poll(0):
@@ -236,7 +236,7 @@ def test_any_bytes_get_an_answer_each(run: Run, service: Service, context: Conte
     async def scenario() -> list[list[bytes]]:
         for number, request in enumerate(requests):
             dealer.send_multipart([b"%d" % number, b"", request])
-        answers = []
+        answers: list[list[bytes]] = []
         while len(answers) < len(requests):
             await asyncio.sleep(0)
             while dealer.poll(0):

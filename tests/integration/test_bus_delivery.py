@@ -9,33 +9,18 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from bus_traffic import BODY, publish, take
 
 from foottrack_protocol import EncodeError, TopicError
-from foottrack_protocol.messages import CameraPreview, GaitEvent, Truth
+from foottrack_protocol.messages import CameraPreview, GaitEvent
 from foottrack_protocol.topics import Policy
 from foottrack_service.bus import Broker, Bus, ManualClock, NotReady, Publisher, Received, Subscriber
 from foottrack_service.bus.endpoints import HWM, Context
 from foottrack_service.bus.subscriber import BATCH
 from foottrack_service.config import BusSettings
 
-BODY = Truth(p=(0.1, 0.2, 0.3), q=(0.0, 0.0, 0.0, 1.0))
 EPHEMERAL = BusSettings(ingress="tcp://127.0.0.1:0", egress="tcp://127.0.0.1:0")
 Run = Callable[..., Any]
-
-
-async def take(subscriber: Subscriber, count: int) -> list[Received]:
-    """The next ``count`` messages."""
-    taken: list[Received] = []
-    async for batch in subscriber.batches():
-        taken += batch
-        if len(taken) >= count:
-            break
-    return taken
-
-
-def publish(publisher: Publisher, count: int, stream: str = "truth/left") -> None:
-    for _ in range(count):
-        publisher.publish("user", stream, 0, BODY)
 
 
 @pytest.mark.parametrize("seed", range(8))

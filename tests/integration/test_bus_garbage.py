@@ -11,12 +11,12 @@ from typing import Any
 import msgpack
 import pytest
 import zmq
+from bus_traffic import BODY, take
+from zmtp import RawSubscriber
 
-from foottrack_protocol.messages import Truth
-from foottrack_service.bus import Bus, ManualClock, Publisher, Received, Subscriber
+from foottrack_service.bus import Bus, ManualClock, Received, Subscriber
 from foottrack_service.bus.endpoints import MAX_FRAME_BYTES, Context
 
-GOOD = Truth(p=(0.1, 0.2, 0.3), q=(0.0, 0.0, 0.0, 1.0))
 TOPIC = b"user/truth/left"
 Run = Callable[..., Any]
 
@@ -117,7 +117,7 @@ def test_a_frame_beyond_all_measure_costs_its_sender_the_connection_and_nobody_e
         await subscriber.ready()
         await publisher.ready()
         rogue.send_multipart([TOPIC, bytes(MAX_FRAME_BYTES + 1)])
-        publisher.publish("user", "truth/left", 0, GOOD)
+        publisher.publish("user", "truth/left", 0, BODY)
         assert len(await until(subscriber, "good")) == 1
 
     run(scenario())
@@ -138,36 +138,50 @@ def test_bytes_that_are_not_zeromq_at_all_are_borne(run: Run, bus: Bus, seed: in
             for start in (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", b"", greeting, greeting[:11]):
                 with network.create_connection(("127.0.0.1", port)) as connection:
                     connection.sendall(start + source.randbytes(500))
-        publisher.publish("user", "truth/left", 0, GOOD)
+        publisher.publish("user", "truth/left", 0, BODY)
         assert len(await until(subscriber, "good")) == 1
         assert publisher.live
 
     run(scenario())
 
 
-def test_a_subscriber_cannot_talk_publishers_out_of_publishing(run: Run, bus: Bus, context: Context) -> None:
-    """Frames that a subscriber sends reach all publishers: none of them may pass for the bus going away."""
+RUDE: list[list[bytes]] = [
+    [b"\x00"],
+    [b"\x00"] * 3,
+    [b"\x01", b"\x00"],
+    [b"\x00user/"],
+    [b"user", b"\x00"],
+    [b"user", b"\x01user/"],
+    [b"x", b"\x01user/", b"y"],
+    [b"\x01user/", b"\x01user/", b"x", b"\x01user/"],
+    [b"\x01sys/welcome/x", b"x", b"\x00"],
+    [b"", b""],
+    [b"\x02ping"],
+]
+
+
+@pytest.mark.parametrize("rude", RUDE, ids=repr)
+def test_a_subscriber_cannot_end_the_bus_for_others(run: Run, bus: Bus, rude: list[bytes]) -> None:
+    """Frames that a subscriber sends reach the proxy's far side and all publishers: they must not pass for the bus
+    going away, nor leave half a message that ends the proxy."""
     publisher, subscriber = bus.publisher("good"), bus.subscriber(["user/"])
-    witness: Publisher = bus.publisher("witness")
-    rogue = context.socket(zmq.XSUB)
-    rogue.connect(bus.settings.egress)
 
     async def scenario() -> None:
-        for part in (publisher, subscriber, witness):
-            await part.ready()
-        for frames in ([b"\x00"], [b"\x01"], [b"\x00"], [b"\x00"], [b"user", b"\x00"], [b"", b"\x01"], [b"\x02x"]):
-            rogue.send_multipart(frames)
-        # The rogue's last word has come all the way up when it has its own message back.
-        rogue.send(b"\x01user/truth/right")
-        while True:
-            witness.publish("user", "truth/right", 0, GOOD)
-            if rogue.poll(5):
-                break
-        assert publisher.live
-        publisher.publish("user", "truth/left", 0, GOOD)
-        received = await until(subscriber, "good")
-        assert received[-1].message.stream == "truth/left"
-        assert publisher.drops == {}
+        await publisher.ready()
+        await subscriber.ready()
+        with RawSubscriber(bus.settings.egress) as rogue:
+            rogue.send(*rude)
+            # What was sent is through the proxy and with the publishers when the greeter's answer is back.
+            rogue.send(b"\x01sys/welcome/done")
+            while rogue.receive() != b"sys/welcome/done":
+                pass
+            for _ in range(100):
+                publisher.publish("user", "truth/left", 0, BODY)
+            assert len(await take(subscriber, 100)) == 100
+        late = bus.subscriber(["user/"])
+        await late.ready()
+        publisher.publish("user", "truth/left", 0, BODY)
+        assert len(await take(late, 1)) == 1
+        assert (publisher.connections, publisher.drops) == (1, {})
 
     run(scenario())
-    rogue.close(0)

@@ -9,12 +9,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from foottrack_protocol.messages import Truth
-from foottrack_service.bus import Broker, Bus, Publisher, Received, Subscriber
+from bus_traffic import BODY, publish, take
+
+from foottrack_service.bus import Broker, Bus, Received, Subscriber
 from foottrack_service.bus.endpoints import Context
 from foottrack_service.config import BusSettings
 
-BODY = Truth(p=(0.1, 0.2, 0.3), q=(0.0, 0.0, 0.0, 1.0))
 TOPIC = "user/truth/left"
 ROOT = Path(__file__).parents[2]
 Run = Callable[..., Any]
@@ -39,20 +39,6 @@ def start(ingress: str) -> subprocess.Popen[bytes]:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "protocol")])}
     command = [sys.executable, "-c", PROCESS, ingress]
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
-
-
-def publish(publisher: Publisher, count: int) -> None:
-    for _ in range(count):
-        publisher.publish("user", "truth/left", 0, BODY)
-
-
-async def take(subscriber: Subscriber, count: int) -> list[Received]:
-    taken: list[Received] = []
-    async for batch in subscriber.batches():
-        taken += batch
-        if len(taken) >= count:
-            break
-    return taken
 
 
 async def connected_again(subscriber: Subscriber) -> list[Received]:

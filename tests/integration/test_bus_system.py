@@ -10,25 +10,15 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from bus_traffic import BODY, take
 
-from foottrack_protocol.messages import Truth
-from foottrack_service.bus import Broker, Bus, ManualClock, Received, Subscriber
+from foottrack_service.bus import Broker, Bus, ManualClock, Received
 from foottrack_service.bus.health import publish_health
 from foottrack_service.bus.log import BusLogHandler
 from foottrack_service.bus.session import SessionInfo, publish_session
 from foottrack_service.bus.timesync import Exchange, SyncedClock
 
-BODY = Truth(p=(0.1, 0.2, 0.3), q=(0.0, 0.0, 0.0, 1.0))
 Run = Callable[..., Any]
-
-
-async def take(subscriber: Subscriber, count: int) -> list[Received]:
-    taken: list[Received] = []
-    async for batch in subscriber.batches():
-        taken += batch
-        if len(taken) >= count:
-            break
-    return taken
 
 
 async def beside(work: Any, scenario: Any) -> Any:
@@ -49,7 +39,7 @@ def test_the_session_is_published_with_the_same_instant_on_both_clocks(run: Run,
         await publisher.ready()
         await subscriber.ready()
         before = time.perf_counter_ns(), time.time_ns()
-        received = await beside(publish_session(publisher, info, period_s=0.01), take(subscriber, 3))
+        received: list[Received] = await beside(publish_session(publisher, info, period_s=0.01), take(subscriber, 3))
         after = time.perf_counter_ns(), time.time_ns()
         for item in received:
             anchor = item.message.data.clock
@@ -110,7 +100,9 @@ def test_health_goes_on_while_messages_never_stop(run: Run, bus: Bus) -> None:
         for part in (publisher, subscriber, monitor):
             await part.ready()
         reports = take(subscriber, 3)
-        return await beside(flood(), beside(publish_health(publisher, bus.health, monitor, period_s=0.02), reports))
+        health = publish_health(publisher, bus.health, monitor, period_s=0.02)
+        received: list[Received] = await beside(flood(), beside(health, reports))
+        return received
 
     counts = [item.message.data.topics["user/truth/left"].messages for item in run(scenario())]
     assert counts == sorted(set(counts))
@@ -220,8 +212,7 @@ def test_inside_the_service_a_connection_works_without_tcp(run: Run, broker: Bro
     subscribers = [inside.subscriber(), outside.subscriber()]
 
     async def scenario() -> None:
-        for part in (*publishers, *subscribers):
-            await part.ready()
+        await asyncio.gather(*(part.ready() for part in publishers), *(part.ready() for part in subscribers))
         for publisher in publishers:
             publisher.publish("user", "truth/left", 0, BODY)
         for subscriber in subscribers:
