@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import msgpack
@@ -19,6 +20,26 @@ from foottrack_protocol.topics import Topic
 
 GOLDEN = [golden for goldens in by_body().values() for golden in goldens]
 GOLDEN += [golden for golden in of_envelope() if not golden.zeros]
+HOSTILE: tuple[Any, ...] = (
+    *(math.nan, math.inf, -math.inf, 1.7976931348623157e308, -1e200, 5e-324, -0.0, 1.5),
+    *(
+        2**64 - 1,
+        2**63,
+        -(2**63),
+        -1,
+        None,
+        True,
+        "",
+        "1",
+        b"",
+        b"1",
+        [],
+        [0.0],
+        {},
+        {"p": [0.0]},
+        msgpack.ExtType(1, b""),
+    ),
+)
 TOPICS = st.sampled_from([topic.encode() for topic, _ in ENTRIES])
 
 
@@ -33,6 +54,24 @@ def outcome(frames: list[bytes] | tuple[bytes, ...]) -> Message | Reason:
     assert all(math.isfinite(number) for number in numbers(message.data.model_dump()))
     assert decode(encode(message)) == message
     return message
+
+
+def leaves(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], Any]]:
+    """All values that are neither map nor array, each with its keys and indices."""
+    if isinstance(value, dict | list):
+        for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from leaves(item, (*place, key))
+    else:
+        yield place, value
+
+
+def with_leaf(value: Any, place: tuple[Any, ...], leaf: Any) -> Any:
+    """A copy with another value in one place."""
+    if not place:
+        return leaf
+    copy = value.copy()
+    copy[place[0]] = with_leaf(value[place[0]], place[1:], leaf)
+    return copy
 
 
 def numbers(value: Any) -> list[float]:
@@ -76,6 +115,18 @@ def test_one_value_replaced(data: st.DataObject) -> None:
     assume("data" in envelope)
     path = data.draw(st.sampled_from(list(paths(envelope))))
     outcome((golden.frames[0], msgpack.packb(changed(envelope, path, data.draw(anything(4))))))
+
+
+@pytest.mark.parametrize(("topic", "entry"), ENTRIES, ids=[topic for topic, _ in ENTRIES])
+def test_every_number_replaced_by_every_hostile_value(topic: str, entry: Topic) -> None:
+    golden = next(golden for golden in GOLDEN if golden.topic == topic)
+    envelope = msgpack.unpackb(golden.payload)
+    for place, given_value in leaves(envelope):
+        for hostile in HOSTILE:
+            found = outcome((topic.encode(), msgpack.packb(with_leaf(envelope, place, hostile))))
+            number = isinstance(given_value, int | float) and not isinstance(given_value, bool)
+            if number and place[0] == "data" and isinstance(hostile, float) and not math.isfinite(hostile):
+                assert found is Reason.NOT_FINITE, place
 
 
 @settings(max_examples=300)
