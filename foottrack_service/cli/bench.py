@@ -30,6 +30,9 @@ _STEP_S = 1.0
 
 def bench(
     seconds: Annotated[float, typer.Option("--seconds", min=1.0, help="How long each latency is measured.")] = 10.0,
+    faults: Annotated[
+        bool, typer.Option("--faults", help="Instead: what is lost when parts fail (half a minute).")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Measure the service: IMU sample to pose, messages per second, idle CPU. Takes about half a minute.
@@ -37,6 +40,12 @@ def bench(
     Latencies are taken in turns with a bare pyzmq hop through the same proxy, so that a busy machine slows both.
     Example: foottrack bench --seconds 20
     """
+    if faults:
+        from foottrack_service.cli.bench_faults import fault_runs
+
+        with Console(stderr=True).status("breaking things ..."):
+            print_json({"faults": run_loop(fault_runs())})
+        return
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs,), daemon=True)
