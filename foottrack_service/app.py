@@ -19,6 +19,7 @@ from foottrack_service.bus.log import BusLogHandler
 from foottrack_service.bus.session import SessionInfo, publish_session
 from foottrack_service.config import Settings
 from foottrack_service.fusion import node as fusion_node
+from foottrack_service.imu import node as imu_node
 from foottrack_service.recording import node as recording_node
 from foottrack_service.recording.node import Recorder
 from foottrack_service.recording.replay_desk import ReplayDesk
@@ -46,6 +47,7 @@ class Node:
 
 NODES: dict[str, Node] = {
     "fusion": Node("fusion", fusion_node.run, vital=True),
+    "imu": Node("imu", imu_node.run),
 }
 """Nodes by the name that ``foottrack node NAME`` takes."""
 
