@@ -37,7 +37,7 @@ CODE_MEANINGS: dict[Code, str] = {
     Code.BAD_REQUEST: "not a msgpack map within the limits, or `cmd` is missing or no string, or `args` is no map",
     Code.UNKNOWN_COMMAND: "no such command, in this version or in this setup",
     Code.BAD_ARGUMENTS: "an argument is missing, unknown, of a wrong type, or out of its range",
-    Code.BUSY: "the same kind of thing is already under way",
+    Code.BUSY: "the same kind of thing is already under way, or too many requests wait",
     Code.UNAVAILABLE: "a sensor, a node or a user that it needs is not there",
     Code.NOT_RUNNING: "there is nothing to stop, to pause or to seek",
     Code.EXISTS: "the name is taken",
@@ -132,10 +132,10 @@ class Command:
     does: str
 
 
-GENERAL_CODES = (Code.BAD_REQUEST, Code.UNKNOWN_COMMAND, Code.BAD_ARGUMENTS, Code.INTERNAL)
+GENERAL_CODES = (Code.BAD_REQUEST, Code.UNKNOWN_COMMAND, Code.BAD_ARGUMENTS, Code.BUSY, Code.INTERNAL)
 """What any request may be refused with."""
 
-_CALIBRATION = (Code.BUSY, Code.UNAVAILABLE, Code.NOT_STILL, Code.FAILED)
+_CALIBRATION = (Code.UNAVAILABLE, Code.NOT_STILL, Code.FAILED)
 _REPLAY = (Code.NOT_RUNNING,)
 
 COMMANDS: dict[str, Command] = {
@@ -151,11 +151,11 @@ COMMANDS: dict[str, Command] = {
         OfUser, MountCalibration, _CALIBRATION, "the camera's mount, while feet stand and the head moves"
     ),
     "record/start": Command(
-        RecordStart, RecordingFile, (Code.BUSY, Code.EXISTS, Code.FAILED), "a recording, into the recordings folder"
+        RecordStart, RecordingFile, (Code.EXISTS, Code.FAILED), "a recording, into the recordings folder"
     ),
     "record/stop": Command(NoArguments, Recorded, (Code.NOT_RUNNING,), "ends and closes the recording"),
     "replay/attach": Command(
-        ReplayAttach, NoArguments, (), "a replay in a process of its own can be asked there; the others are passed on to it"
+        ReplayAttach, NoArguments, (), "a replay in a process of its own can be asked there; the others are passed on"
     ),
     "replay/pause": Command(NoArguments, ReplayState, _REPLAY, "holds the replay"),
     "replay/resume": Command(NoArguments, ReplayState, _REPLAY, "goes on"),
