@@ -24,8 +24,8 @@ SETTLE = 0.12
 
 @dataclass(frozen=True)
 class Footprint:
-    """One contact of one foot. `place` (x, z) m is the floor below the ankle of the flat foot, `yaw` rad the foot's
-    own and `heading` that of the path there. Phases are in cycles of the walk: strike, flat, heel_off, toe_off; a
+    """One contact of one foot. `place` (x, z) m is the floor below the ankle of the flat foot, `yaw` rad.
+    Phases are in cycles of the walk: strike, flat, heel_off, toe_off; a
     foot that stands from the beginning has strike and flat at minus infinity, one that stays has heel_off and toe_off
     at infinity. `lift` and `land` scale the pitch with which it leaves and with which it arrived.
     """
@@ -33,7 +33,6 @@ class Footprint:
     side: str
     place: tuple[float, float]
     yaw: float
-    heading: float
     strike: float
     flat: float
     heel_off: float
@@ -84,13 +83,12 @@ def plan_walk(cycle: Cycle, path: Path, steps: int | None = None, *, start: bool
     ) -> None:
         at = np.array([arc])
         x, z = path.offset(at, cycle.stance_x[side])[0]
-        heading = float(path.heading(at)[0])
+        yaw = float(path.heading(at)[0]) + cycle.stance_yaw[side]
         feet[side].append(
             Footprint(
                 side,
                 (float(x), float(z)),
-                heading + cycle.stance_yaw[side],
-                heading,
+                yaw,
                 strike=-np.inf if first else strike,
                 flat=-np.inf if first else strike + timing.flat,
                 heel_off=np.inf if last else strike + timing.heel_off,

@@ -98,7 +98,7 @@ class _Change:
     def foot(self, side: str, key: Key) -> FootPose:
         foot = key.pose.left if side == "left" else key.pose.right
         x, y, z = foot.ankle
-        up, ahead = (float(v) for v in planted_ankle(self.body, np.array(foot.pitch)))
+        ahead = float(planted_ankle(self.body, np.array(foot.pitch))[1])
         # The roll of a foot is the foot's own length and does not grow with the step.
         z = key.pose.hips[2] + (z - key.pose.hips[2] - ahead) * self.step + ahead
         if (key.phase - STRIKE[side]) % 1.0 > self.toe_off:

@@ -26,6 +26,8 @@ from foottrack_service.walkcycle.timing import Clock, make_clock
 
 Array = npt.NDArray[np.float64]
 
+_MOMENT_S = 5e-4
+
 
 @dataclass(frozen=True)
 class FootTargets:
@@ -117,6 +119,14 @@ class Walk:
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         return close_legs(self.body, times, self.targets(times))
 
+    def ground(self, times: npt.ArrayLike) -> tuple[Array, Array]:
+        """The guide on the path at instants (n,) s: heading (n,) rad and speed (n,) m/s."""
+        times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        arc = self._guide(self.clock.phase(times))
+        ahead, behind = np.minimum(times + _MOMENT_S, self.duration), np.maximum(times - _MOMENT_S, 0.0)
+        gone = self._guide(self.clock.phase(ahead)) - self._guide(self.clock.phase(behind))
+        return self.path.heading(arc), np.asarray(gone / np.maximum(ahead - behind, _MOMENT_S))
+
     @cached_property
     def contacts(self) -> list[Contact]:
         """All contacts in the order of their strikes."""
@@ -189,18 +199,19 @@ class Walk:
         pitch, toes = scale * curves.pitch(own), scale * curves.toes_pitch(own)
         turn = np.mod(following.yaw - now.yaw + np.pi, 2.0 * np.pi) - np.pi
         travel = curves.travel(own)
-        back = travel - np.array([0.0, 0.0, self.cycle.stride])
         rolled = rolled_ankle(self.body, pitch, curves.ball_share(u))
         facing = now.yaw + turn * warp + curves.yaw(own)
+        # The rolling point goes beside the path as it bends, from one footprint to the next, and rests at both.
+        arc = now.arc + travel[:, 2] / self.cycle.stride * (following.arc - now.arc)
+        point = self.path.offset(arc, self.cycle.stance_x[side] + travel[:, 0])
         ankle = np.stack(
-            [rolled[:, 1] * np.sin(facing), travel[:, 1] + rolled[:, 0], rolled[:, 1] * np.cos(facing)], axis=-1
+            [
+                point[:, 0] + rolled[:, 1] * np.sin(facing),
+                travel[:, 1] + rolled[:, 0],
+                point[:, 1] + rolled[:, 1] * np.cos(facing),
+            ],
+            axis=-1,
         )
-        # The way as seen from the footprint it leaves and from the one it comes to; on a straight line at the
-        # cycle's own stride both say the same.
-        for weight, base, moved in ((1.0 - warp, now, travel), (warp, following, back)):
-            c, s = np.cos(base.heading), np.sin(base.heading)
-            ankle[:, 0] += weight * (base.place[0] + moved[:, 2] * s + moved[:, 0] * c)
-            ankle[:, 2] += weight * (base.place[1] + moved[:, 2] * c - moved[:, 0] * s)
         return ankle, facing, pitch, toes_above_floor(self.body, ankle[:, 1], pitch, toes)
 
 
