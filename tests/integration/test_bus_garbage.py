@@ -171,6 +171,10 @@ def test_a_subscriber_cannot_end_the_bus_for_others(run: Run, bus: Bus, rude: li
         await subscriber.ready()
         with RawSubscriber(bus.settings.egress) as rogue:
             rogue.send(*rude)
+            # Alone: a subscription right behind it would fill up half a message.
+            for _ in range(50):
+                publisher.publish("user", "truth/left", 0, BODY)
+                assert len(await take(subscriber, 1)) == 1
             # What was sent is through the proxy and with the publishers when the greeter's answer is back.
             rogue.send(b"\x01sys/welcome/done")
             while rogue.receive() != b"sys/welcome/done":
