@@ -8,7 +8,7 @@ import typer
 
 from foottrack_protocol.errors import ProtocolError
 from foottrack_service.bus.errors import BusError
-from foottrack_service.cli import bench, demo, imu, log, recordings, running, service, sim, watch
+from foottrack_service.cli import bench, calibrate, demo, imu, log, recordings, running, service, sim, watch
 from foottrack_service.config import ConfigError
 from foottrack_service.recording.errors import RecordingError
 
@@ -27,6 +27,7 @@ app.command()(recordings.replay)
 app.command()(watch.top)
 app.command()(watch.echo)
 app.command()(bench.bench)
+app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(imu.app, name="imu")
 app.add_typer(log.app, name="log", help="Look into recordings: info, cat, export, import, diff, recover.")
 
