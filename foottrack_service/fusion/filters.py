@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from foottrack_protocol.messages import Side
 from foottrack_service.config import Settings
+from foottrack_service.fusion.foot_filter import ErrorStateFilter
 from foottrack_service.fusion.interface import FootFilter
 from foottrack_service.fusion.reference import ReferenceFilter
 
 
 def make_filter(settings: Settings, side: Side) -> FootFilter:
     """One foot's filter, as the settings choose it."""
-    return ReferenceFilter(settings.feet.of(side), side)
+    foot = settings.feet.of(side)
+    if settings.fusion.filter == "reference":
+        return ReferenceFilter(foot, side)
+    return ErrorStateFilter(foot, side, floor=settings.fusion.floor)

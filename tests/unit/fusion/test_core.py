@@ -11,7 +11,7 @@ from foottrack_protocol import Message, decode, encode
 from foottrack_protocol import messages as m
 from foottrack_protocol.frames import STANDARD_GRAVITY
 from foottrack_service import rotations as rot
-from foottrack_service.config import Settings
+from foottrack_service.config import FusionSettings, Settings
 from foottrack_service.fusion.core import FusionCore
 from foottrack_service.fusion.offline import fuse
 
@@ -38,6 +38,10 @@ def marker(t, p, side="left", q=None):
     return message(f"marker/{side}", t, body)
 
 
+AT_ONCE = Settings(fusion=FusionSettings(filter="reference"))
+"""The reference filter believes the first fix; ours wants fixes that agree."""
+
+
 def feed(core, messages):
     return [out for each in messages for out in core.handle(each, each.t)]
 
@@ -53,7 +57,7 @@ def test_an_imu_alone_brings_its_foot_and_no_legs():
 
 
 def test_head_and_tags_alone_bring_legs():
-    core = FusionCore(Settings())
+    core = FusionCore(AT_ONCE)
     outs = feed(core, [head(0), marker(0, (-0.1, -1.5, -0.15)), marker(0, (0.1, -1.5, -0.15), side="right")])
     outs += core.tick(core.deadline)
     body = outs[-1].data
@@ -130,7 +134,7 @@ def test_a_known_recentring_moves_everything_rigidly():
 
 
 def test_an_unknown_recentring_begins_again_and_never_drifts_across():
-    core = FusionCore(Settings())
+    core = FusionCore(AT_ONCE)
     feed(core, [head(0), marker(0, (-0.1, -1.5, -0.15)), head(2 * MS, p=(5.0, 1.6, 5.0), origin=1)])
     assert core.tick(core.deadline)[-1].data.left is None
     out = feed(core, [marker(40 * MS, (-0.1, -1.5, -0.15)), imu(41 * MS)])[-1]
@@ -157,7 +161,7 @@ def test_calibrations_are_applied_when_they_arrive():
 
 
 def test_a_mount_correction_counts_only_for_the_mount_it_was_found_for():
-    config = Settings()
+    config = AT_ONCE
     for base, shift in (("another", 0.0), (config.camera.mount_hash, 0.1)):
         core = FusionCore(config)
         values = m.MountValues(p=(0.1, 0, 0), q=IDENTITY, sigma_p=1e-3, sigma_q=1e-3, base=base)
