@@ -61,14 +61,16 @@ class McapRecording(Recording):
                 container.attachment(record, self.path)
 
     def span(self) -> Span | None:
-        """From when to when, by the chunks' headers; None when it is empty."""
-        first = last = None
+        """From when to when, by the chunks' headers and the messages outside chunks; None when it is empty."""
+        stamps: list[int] = []
         for record in self._records():
             if record.opcode == Opcode.CHUNK:
                 packed = container.chunk(record, self.path)
-                first = packed.start if first is None else min(first, packed.start)
-                last = packed.end if last is None else max(last, packed.end)
-        return None if first is None or last is None else Span(first, last)
+                stamps = [min([*stamps, packed.start]), max([*stamps, packed.end])]
+            elif record.opcode == Opcode.MESSAGE:
+                arrival = container.raw_message(record, self.path).log_time
+                stamps = [min([*stamps, arrival]), max([*stamps, arrival])]
+        return Span(stamps[0], stamps[1]) if stamps else None
 
     def topics(self) -> frozenset[bytes]:
         """Topics, by the summary where there is one."""

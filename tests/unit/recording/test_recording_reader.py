@@ -167,6 +167,8 @@ def test_files_that_others_wrote_can_be_read(tmp_path: Path, options: dict[str, 
     recording = open_recording(foreign(tmp_path / "a.mcap", sent, **options))
     assert list(recording.frames()) == sent
     assert list(recording.frames(sent[30].arrival)) == sent[30:]
+    assert recording.span() == (sent[0].arrival, sent[-1].arrival)
+    assert recording.topics() == {frame.topic for frame in sent}
     assert recording.config_toml is None
 
 
