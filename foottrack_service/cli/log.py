@@ -221,7 +221,7 @@ def _readable_errors(code: int = EXIT_FAILED) -> Iterator[None]:
     try:
         yield
     except RecordingError as error:
-        hint = "" if error.offset is None else "; `foottrack log recover` brings what is whole"
+        hint = "" if not error.offset else "; `foottrack log recover` brings what is whole"
         raise CommandFailed(f"{error}{hint}", code) from None
     except BrokenPipeError:
         raise
