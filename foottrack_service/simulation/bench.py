@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 
@@ -17,9 +16,9 @@ from foottrack_service.config import Settings
 from foottrack_service.rotations import Array
 from foottrack_service.simulation import noise
 from foottrack_service.simulation.anatomy import sole
+from foottrack_service.simulation.easing import ease
+from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.truth import GRID_HZ, FootTrack, Track, Truth, grid
-
-Feet = Literal["mild", "hard"]
 
 _HEAD = np.array([0.0, 1.5, 0.0])  # m: [B]'s stand
 _HEAD_PITCH = math.radians(-55.0)  # the camera, 20 deg lower, then looks 75 deg down
@@ -42,8 +41,8 @@ def tracker_moving(seconds: float, settings: Settings, feet: Feet, random: np.ra
     t = grid(seconds)
     path = _tour(t, seconds, random, _REACH)
     # A hand holds the tracker above the floor and never quite level.
-    path[:, 1] += _REACH * 1.2 * _ease((t - 1.0) / 1.5)
-    held = _ease((t - 1.0) / 1.5)[:, None]
+    path[:, 1] += _REACH * 1.2 * ease((t - 1.0) / 1.5)
+    held = ease((t - 1.0) / 1.5)[:, None]
     path += held * noise.wander(random, len(t), GRID_HZ, 1.5, _HAND_SWAY)
     tilt = held * noise.wander(random, len(t), GRID_HZ, 0.8, np.radians([5.0, 6.0, 5.0]))
     return _scene(t, seconds, settings, path, tilt, np.zeros_like(path), np.zeros_like(path))
@@ -53,7 +52,7 @@ def head_bench(seconds: float, settings: Settings, feet: Feet, random: np.random
     """The headset is moved the same ways and turned a little; trackers fixed."""
     t = grid(seconds)
     path = _tour(t, seconds, random, 0.6 * _REACH)
-    moves = _ease((t - 1.0) / 1.5)[:, None]
+    moves = ease((t - 1.0) / 1.5)[:, None]
     tilt = moves * noise.wander(random, len(t), GRID_HZ, 0.5, np.radians([2.5, 4.0, 2.0]))
     none = np.zeros_like(path)
     return _scene(t, seconds, settings, none, none, path, tilt)
@@ -67,7 +66,7 @@ def sudden_move(seconds: float, settings: Settings, feet: Feet, random: np.rando
     at = np.zeros(3)
     while start + 1.0 < seconds:
         target = np.array([side * random.uniform(0.1, 0.18), 0.0, random.uniform(-0.12, 0.12)])
-        path += (target - at) * _ease((t - start) / random.uniform(0.15, 0.25))[:, None]
+        path += (target - at) * ease((t - start) / random.uniform(0.15, 0.25))[:, None]
         at, side, start = target, -side, start + random.uniform(2.0, 3.0)
     none = np.zeros_like(path)
     return _scene(t, seconds, settings, path, none, none, none)
@@ -86,12 +85,12 @@ def _tour(t: Array, seconds: float, random: np.random.Generator, reach: float) -
             if start + out + back > seconds:
                 return path
             way = reach * random.uniform(0.8, 1.0) * np.array(direction)
-            path += way * (_ease((t - start) / out) - _ease((t - start - out) / back))[:, None]
+            path += way * (ease((t - start) / out) - ease((t - start - out) / back))[:, None]
             start += out + back + random.uniform(0.1, 0.4)
         period = random.uniform(2.5, 3.5)
         if start + period > seconds:
             return path
-        angle = 2.0 * math.pi * _ease((t - start) / period)
+        angle = 2.0 * math.pi * ease((t - start) / period)
         path += 0.6 * reach * np.stack([np.sin(angle), np.zeros_like(t), np.cos(angle) - 1.0], axis=-1)
         start += period + random.uniform(0.3, 0.8)
     return path
@@ -118,8 +117,3 @@ def _scene(
             ball_point=base.ball,
         )
     return Truth(seconds, head, feet)
-
-
-def _ease(share: Array) -> Array:
-    s = np.clip(share, 0.0, 1.0)
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)

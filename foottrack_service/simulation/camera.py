@@ -24,7 +24,8 @@ BASELINE = 0.050  # m, between the two infrared eyes
 EXPOSURE_S = 0.003
 READOUT_S = 0.010  # s from the first row to the last: the colour sensor's shutter rolls
 _GRAZING = math.cos(math.radians(75.0))  # a tag seen flatter than that is no tag
-_SHANK_RADIUS, _THIGH_RADIUS = 0.05, 0.075  # m, trousers included
+# m: half of an adult's ankle and knee breadth and of the thigh near the hip, from usual girths (0.22, 0.33, 0.55 m).
+_ANKLE_RADIUS, _KNEE_RADIUS, _HIP_RADIUS = 0.035, 0.052, 0.088
 
 
 @dataclass(frozen=True)
@@ -141,8 +142,8 @@ def hidden(truth: Truth, points: Array, camera: Eye, settings: Settings) -> Flag
         yaw = rotations.yaw_of(foot_q)
         forward = rotations.rotate(rotations.from_yaw(yaw), [0.0, 0.0, -1.0])
         knee = knees(hip, ankle, forward, wearer)
-        behind |= _distance(camera.p, points, ankle, knee) < _SHANK_RADIUS
-        behind |= _distance(camera.p, points, knee, hip) < _THIGH_RADIUS
+        behind |= _clearance(camera.p, points, ankle, knee, (_ANKLE_RADIUS, _KNEE_RADIUS)) < 0.0
+        behind |= _clearance(camera.p, points, knee, hip, (_KNEE_RADIUS, _HIP_RADIUS)) < 0.0
     return behind
 
 
@@ -177,8 +178,11 @@ def _pixels(local: Array) -> Array:
     )
 
 
-def _distance(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """(n,) m between the segments a-b and c-d, all (n, 3) (Ericson, Real-Time Collision Detection, 5.1.9)."""
+def _clearance(a: Array, b: Array, c: Array, d: Array, radii: tuple[float, float]) -> Array:
+    """(n,) m between the line a-b and a limb c-d with these radii at its ends, all (n, 3).
+
+    The nearest points of two segments as in Ericson, Real-Time Collision Detection, 5.1.9.
+    """
     u, v, w = b - a, d - c, a - c
     uu, vv = np.sum(u * u, axis=-1), np.sum(v * v, axis=-1)
     uv, uw, vw = np.sum(u * v, axis=-1), np.sum(u * w, axis=-1), np.sum(v * w, axis=-1)
@@ -187,5 +191,4 @@ def _distance(a: Array, b: Array, c: Array, d: Array) -> Array:
     t = np.clip((uv * s + vw) / vv, 0.0, 1.0)
     s = np.clip((uv * t - uw) / uu, 0.0, 1.0)
     gap = w + s[:, None] * u - t[:, None] * v
-    distance: Array = np.linalg.norm(gap, axis=-1)
-    return distance
+    return np.asarray(np.linalg.norm(gap, axis=-1) - radii[0] - t * (radii[1] - radii[0]))

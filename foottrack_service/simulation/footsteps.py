@@ -17,6 +17,7 @@ from scipy.interpolate import BPoly
 from foottrack_service import rotations
 from foottrack_service.rotations import Array
 from foottrack_service.simulation.anatomy import Sole
+from foottrack_service.simulation.easing import ease
 from foottrack_service.simulation.rocker import rocker
 from foottrack_service.simulation.truth import Flags
 
@@ -159,7 +160,7 @@ def _take(foot: FootSamples, old: Place, step: Step, sole: Sole) -> None:
     share = (t[flies] - step.start) / style.swing
     foot.p[flies] = way(t[flies])
     foot.p[flies, 1] += style.lift * (4.0 * share * (1.0 - share)) ** 3
-    foot.yaw[flies] = old.yaw + (new.yaw - old.yaw) * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    foot.yaw[flies] = old.yaw + (new.yaw - old.yaw) * ease(share)
     after = t >= step.strike
     foot.yaw[after] = new.yaw
     foot.p[t >= step.flat] = [new.x, sole.ankle_height, new.z]

@@ -14,6 +14,8 @@ from foottrack_service.simulation.anatomy import Sole
 from foottrack_service.simulation.footsteps import FootSamples
 from foottrack_service.simulation.truth import GRID_HZ, FootTrack
 
+Feet = Literal["mild", "hard"]
+
 # Peaks of real heel strikes at the shoe are 45 to 170 m/s^2 (walking to running); a walk has 40 to 110.
 _STRIKE_PEAK = (40.0, 110.0)  # m/s^2
 _SLAP_PEAK = (15.0, 40.0)  # m/s^2, when the forefoot hits the floor
@@ -24,7 +26,7 @@ _SOFT_TILT = np.radians([0.35, 0.2, 0.35])  # SD in stance on it
 _SOFT_BAND_HZ = 3.0  # Hz, of the sway: a person's balancing and its tremor
 
 
-def track(foot: FootSamples, sole: Sole, feet: Literal["mild", "hard"], random: np.random.Generator) -> FootTrack:
+def track(foot: FootSamples, sole: Sole, feet: Feet, random: np.random.Generator) -> FootTrack:
     """The foot's track, with what its shoe adds."""
     p, q = foot.p, foot.q
     # Drawn for both kinds, so that mild and hard feet walk the same way.

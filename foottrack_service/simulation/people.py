@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 import numpy as np
 
 from foottrack_protocol.messages import Side
 from foottrack_service.config import Settings
-from foottrack_service.rotations import Array
 from foottrack_service.simulation import footwear
 from foottrack_service.simulation.anatomy import person, sole
-from foottrack_service.simulation.footsteps import stepping
+from foottrack_service.simulation.easing import there_and_back
+from foottrack_service.simulation.footsteps import Place, stepping
+from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.posture import Bearing, Extra, carried
 from foottrack_service.simulation.stride import (
     CAUTIOUS,
@@ -24,8 +24,6 @@ from foottrack_service.simulation.stride import (
 )
 from foottrack_service.simulation.truth import FootTrack, Truth, grid
 
-Feet = Literal["mild", "hard"]
-
 
 def head_moving(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
     """Feet still, the head turns, nods, tilts and shifts."""
@@ -35,7 +33,7 @@ def head_moving(seconds: float, settings: Settings, feet: Feet, random: np.rando
 
 def steps(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
     """One step forward and back."""
-    return _pairs(seconds, settings, feet, random, [(0.5, 0.0), (-0.45, 0.0)])
+    return _pairs(seconds, settings, feet, random, [(0.5, 0.0), (-0.5, 0.0)])
 
 
 def side_steps(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
@@ -67,14 +65,18 @@ def circle(seconds: float, settings: Settings, feet: Feet, random: np.random.Gen
 
 
 def knee_bends(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
-    """Down by 20 to 35 cm and up again every 3 s."""
+    """Down by 12 to 28 cm and up again every 3 s."""
     t = grid(seconds)
     crouch = np.zeros_like(t)
     start = 1.5
     while start + 3.0 < seconds:
-        crouch += random.uniform(0.2, 0.35) * _there_and_back(t, start, start + 3.0)
+        crouch += random.uniform(0.12, 0.28) * there_and_back(t, start, start + 3.0)
         start += 3.0 + random.uniform(0.1, 0.6)
-    return _scene(seconds, settings, feet, random, Planner(random), Bearing(), Extra(crouch=crouch, lean=0.6 * crouch))
+    # Feet apart and turned out; hips back and trunk forward in balance, so the knees do not pass the toes.
+    out = math.radians(10.0)
+    plan = Planner(random, feet={"left": Place(-0.16, 0.0, out), "right": Place(0.16, 0.0, -out)})
+    squat = Extra(crouch=crouch, back=0.9 * crouch, lean=1.3 * crouch)
+    return _scene(seconds, settings, feet, random, plan, Bearing(), squat)
 
 
 def upper_body(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
@@ -83,7 +85,7 @@ def upper_body(seconds: float, settings: Settings, feet: Feet, random: np.random
     yaw, lean = np.zeros_like(t), np.zeros_like(t)
     start, direction = 1.5, 1.0
     while start + 3.0 < seconds:
-        bump = _there_and_back(t, start, start + 3.0)
+        bump = there_and_back(t, start, start + 3.0)
         yaw += direction * math.radians(random.uniform(35.0, 60.0)) * bump
         lean += random.uniform(0.03, 0.1) * bump
         start, direction = start + 3.0 + random.uniform(0.1, 0.5), -direction
@@ -156,14 +158,3 @@ def _scene(
         side: footwear.track(foot, sole(settings.feet.of(side)), feet, random) for side, foot in samples.items()
     }
     return Truth(seconds, head, tracks, hips)
-
-
-def _there_and_back(t: Array, start: float, end: float) -> Array:
-    """0 to 1 and back to 0 between two instants, with a rest at the top, C2."""
-    rise = 0.4 * (end - start)
-    return _ease((t - start) / rise) - _ease((t - end + rise) / rise)
-
-
-def _ease(share: Array) -> Array:
-    s = np.clip(share, 0.0, 1.0)
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)

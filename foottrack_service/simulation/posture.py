@@ -38,9 +38,10 @@ class Bearing:
 
 @dataclass(frozen=True)
 class Extra:
-    """What the task adds, on the truth's grid: crouch (n,) m down, lean forward (n,) m, head turn (n,) rad."""
+    """What the task adds, on the truth's grid: hips down and back, trunk forward (n,) m, head turn (n,) rad."""
 
     crouch: Array | float = 0.0
+    back: Array | float = 0.0
     lean: Array | float = 0.0
     yaw: Array | float = 0.0
 
@@ -56,6 +57,7 @@ def carried(
     hips = _hips(left, right, facing, bearing, person)
     sway = noise.wander(random, n, GRID_HZ, bearing.sway_band_hz, bearing.sway_sd)
     hips += sway * [1.0, 0.0, 1.0]
+    hips += np.asarray(extra.back)[..., None] * rotations.rotate(facing, [0.0, 0.0, 1.0])
     standing = person.hip_height - np.asarray(extra.crouch) + 0.1 * (sway[:, 1] - 2.0 * bearing.sway_sd)
     hips[:, 1] = _height(hips, left, right, facing, person, standing)
 

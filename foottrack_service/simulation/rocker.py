@@ -9,6 +9,7 @@ from scipy.interpolate import make_interp_spline
 
 from foottrack_service.rotations import Array
 from foottrack_service.simulation.anatomy import Sole
+from foottrack_service.simulation.easing import ease
 
 _LEAST_SPRING = np.radians(5.0)  # rad: a sole that does not rise towards the toes still bends a little
 
@@ -43,8 +44,7 @@ class Rocker:
         """The ankle's forward (from the ball's place while flat) and up."""
         ahead, below = self.contact(pitch)
         sine, cosine = np.sin(pitch), np.cos(pitch)
-        share = np.clip(pitch / self._end, 0.0, 1.0)
-        travelled = self._length * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+        travelled = self._length * ease(pitch / self._end)  # whose derivative is the bump
         return travelled + below * sine - ahead * cosine, below * cosine + ahead * sine
 
     def radius(self, pitch: float) -> float:

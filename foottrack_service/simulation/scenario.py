@@ -20,8 +20,9 @@ from foottrack_service.simulation.emission import (
     truth_emission,
 )
 from foottrack_service.simulation.faults import Fault
+from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.imu import measured as measured_by_imu
-from foottrack_service.simulation.tasks import TASKS, Feet
+from foottrack_service.simulation.tasks import TASKS
 from foottrack_service.simulation.truth import BOTH, Truth
 
 _HOP_NS = 150_000

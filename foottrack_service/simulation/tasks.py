@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from foottrack_service.config import Settings
 from foottrack_service.simulation import bench, people
+from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.truth import Truth
 
-Feet = Literal["mild", "hard"]
 Maker = Callable[[float, Settings, Feet, np.random.Generator], Truth]
 
 

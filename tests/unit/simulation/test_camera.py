@@ -82,14 +82,15 @@ def test_nobody_stands_in_the_way_on_the_bench() -> None:
     assert seen(made("still")).found.sum() > 0.97 * 16 * 60
 
 
-def test_segments_distance_by_hand() -> None:
+def test_clearance_of_a_limb_by_hand() -> None:
     def between(*ends: tuple[float, float, float]) -> float:
-        return float(camera._distance(*(np.array([end], dtype=np.float64) for end in ends))[0])
+        a, b, c, d = (np.array([end], dtype=np.float64) for end in ends)
+        return float(camera._clearance(a, b, c, d, (0.1, 0.3))[0])
 
-    assert between((0, 0, 0), (2, 0, 0), (1, 1, -1), (1, 1, 1)) == pytest.approx(1.0)
-    assert between((0, 0, 0), (1, 0, 0), (4, 4, 0), (4, 5, 0)) == pytest.approx(5.0)
-    assert between((0, 0, 0), (1, 0, 0), (0, 0, 2), (1, 0, 2)) == pytest.approx(2.0)
-    assert between((0, 0, 0), (1, 1, 0), (1, 0, 0), (0, 1, 0)) == pytest.approx(0.0, abs=1e-9)
+    assert between((0, 0, 0), (2, 0, 0), (1, 1, -1), (1, 1, 1)) == pytest.approx(1.0 - 0.2)
+    assert between((0, 0, 0), (1, 0, 0), (4, 4, 0), (4, 5, 0)) == pytest.approx(5.0 - 0.1)
+    assert between((0, 0, 0), (1, 0, 0), (-3, 0, 2), (0, 0, 2)) == pytest.approx(2.0 - 0.3)
+    assert between((0, 0, 0), (1, 1, 0), (1, 0, 0), (0, 1, 0)) == pytest.approx(-0.2)
 
 
 @pytest.mark.parametrize("task", ["still", "head-bench", "tracker-moving"])

@@ -141,7 +141,7 @@ def test_what_cannot_be_is_refused(arguments: dict[str, Any], text: str) -> None
         simulate(**{"task": "walk", "seed": 1, **arguments})
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("task", ["line", "circle", "walk", "walk-in-place", "steps", "side-steps"])
 def test_any_seed_and_length_makes_a_plan(task: str, seed: int) -> None:
     for seconds in (1.0, 7.3, 45.0):

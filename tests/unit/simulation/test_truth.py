@@ -14,9 +14,10 @@ from foottrack_service.rotations import Array
 from foottrack_service.simulation.anatomy import Sole, knees, person
 from foottrack_service.simulation.anatomy import sole as sole_from
 from foottrack_service.simulation.footsteps import Place, Step, stepping
+from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.rocker import rocker
 from foottrack_service.simulation.stride import CAUTIOUS, IN_PLACE, WALKING
-from foottrack_service.simulation.tasks import TASKS, Feet
+from foottrack_service.simulation.tasks import TASKS
 from foottrack_service.simulation.truth import BOTH, FootTrack, Track, Truth, grid
 
 SECONDS = 12.0
