@@ -21,48 +21,44 @@ from foottrack_service.bus.clock import now
 from foottrack_service.config import Settings
 from foottrack_service.imu import node
 from foottrack_service.imu.axes import Axes
-from foottrack_service.imu.devices.bno08x import Bno08xDevice
-from foottrack_service.imu.devices.pty_port import PtyPort
-from foottrack_service.imu.devices.serial_devices import AsciiDevice, RawDevice, RvcDevice, SimulatedDevice
+from foottrack_service.imu.devices.plugged import PluggedImu
 from foottrack_service.imu.devices.slimevr import SlimeVrDevice
-from foottrack_service.imu.sample import DeviceSample
 
 PERIOD_S = 0.005
 TILT = rotations.from_axis_angle([0.0, 0.0, 1.0], 0.3)
 """Sensor to a y-up world, on the wire."""
 
 
-def at_rest(ticks: int) -> DeviceSample:
+def at_rest(t_dev_us: int = 0) -> Imu:
     x, y, z = rotations.unrotate(TILT, [0.0, STANDARD_GRAVITY, 0.0])
     q = tuple(float(v) for v in TILT)
-    return Axes().from_wire((float(x), float(y), float(z)), (0.1, 0.2, 0.3), q, ticks)  # type: ignore[arg-type]
+    return Imu(acc=(float(x), float(y), float(z)), gyro=(0.1, 0.2, 0.3), q=q, t_dev=t_dev_us, t_arr=0)  # type: ignore[arg-type]
 
 
 class Wearer:
-    """Plays a device into a pty in real time, and answers for it."""
+    """Plays a device into a pty in real time, at a name that stays when it is plugged in anew."""
 
-    def __init__(self, port: Path, device: SimulatedDevice) -> None:
+    def __init__(self, port: Path, name: str) -> None:
         self._port = port
-        self._device = device
-        self._pty: PtyPort | None = None
+        self._name = name
+        self._imu: PluggedImu | None = None
 
     def plug(self) -> None:
-        self._pty = PtyPort()
+        self._imu = PluggedImu(self._name)
         fresh = self._port.with_suffix(".new")
-        fresh.symlink_to(self._pty.port)
+        fresh.symlink_to(self._imu.port)
         fresh.replace(self._port)
 
     def unplug(self) -> None:
-        if self._pty is not None:
-            self._pty.close()
-        self._pty = None
+        if self._imu is not None:
+            self._imu.close()
+        self._imu = None
 
     async def run(self) -> None:
         start = now()
         while True:
-            if self._pty is not None:
-                self._pty.write(self._device.hear(self._pty.read()))
-                self._pty.write(self._device.measure(at_rest((now() - start) // 1000)))
+            if self._imu is not None:
+                self._imu.send(at_rest((now() - start) // 1000))
             await asyncio.sleep(PERIOD_S)
 
 
@@ -104,21 +100,14 @@ def check_at_rest(message: Any, has_gyro: bool, has_q: bool) -> None:
     assert message.t <= imu.t_arr <= message.t_pub
 
 
-CASES: list[tuple[str, Callable[[], SimulatedDevice], bool, bool]] = [
-    ("ascii", AsciiDevice, False, True),
-    ("rvc", RvcDevice, False, True),
-    ("bno08x", Bno08xDevice, True, True),
-    ("raw", RawDevice, True, False),
-]
+CASES = [("ascii", False, True), ("rvc", False, True), ("bno08x", True, True), ("raw", True, False)]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no ptys")
-@pytest.mark.parametrize(("name", "make", "has_gyro", "has_q"), CASES)
-def test_from_bytes_to_the_bus(
-    name: str, make: Callable[[], SimulatedDevice], has_gyro: bool, has_q: bool, tmp_path: Path, bus: Bus, run: Any
-) -> None:
+@pytest.mark.parametrize(("name", "has_gyro", "has_q"), CASES)
+def test_from_bytes_to_the_bus(name: str, has_gyro: bool, has_q: bool, tmp_path: Path, bus: Bus, run: Any) -> None:
     async def scenario() -> None:
-        wearer = Wearer(tmp_path / "left", make())
+        wearer = Wearer(tmp_path / "left", name)
         wearer.plug()
         settings = Settings(imu={"left": {"format": name, "port": str(tmp_path / "left"), "delay": 0.002}})
         listener = Listener(bus)
@@ -141,7 +130,7 @@ def test_from_bytes_to_the_bus(
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no ptys")
 def test_one_foot_unplugged_does_not_disturb_the_other(tmp_path: Path, bus: Bus, run: Any) -> None:
     async def scenario() -> None:
-        left, right = Wearer(tmp_path / "left", Bno08xDevice()), Wearer(tmp_path / "right", RawDevice())
+        left, right = Wearer(tmp_path / "left", "bno08x"), Wearer(tmp_path / "right", "raw")
         left.plug()
         right.plug()
         settings = Settings(
@@ -187,6 +176,8 @@ class Datagrams(asyncio.DatagramProtocol):
 
     def __init__(self, device: SlimeVrDevice) -> None:
         self._device = device
+        imu = at_rest()
+        self._sample = Axes().from_wire(imu.acc, imu.gyro, imu.q, None)
 
     def connection_made(self, transport: Any) -> None:
         self.transport = transport
@@ -197,7 +188,7 @@ class Datagrams(asyncio.DatagramProtocol):
 
     async def run(self) -> None:
         while True:
-            for datagram in self._device.idle(now() * 1e-9) + self._device.measure(at_rest(0)):
+            for datagram in self._device.idle(now() * 1e-9) + self._device.measure(self._sample):
                 self.transport.sendto(datagram)
             await asyncio.sleep(PERIOD_S)
 

@@ -43,18 +43,15 @@ class AsciiDevice(SimulatedDevice):
 
 
 class RvcDevice(SimulatedDevice):
-    """BNO08x in UART-RVC mode. Needs ``q``; counts its samples itself."""
-
-    def __init__(self) -> None:
-        self._index = 0
+    """BNO08x in UART-RVC mode. Needs ``ticks`` (us) and ``q``: its index counts periods, also those of lost samples."""
 
     def measure(self, sample: DeviceSample) -> bytes:
-        if sample.q is None:
-            raise ValueError("UART-RVC carries q")
+        if sample.q is None or sample.ticks is None:
+            raise ValueError("UART-RVC carries q, and an index that is made of ticks")
         yaw, pitch, roll = _angles(sample.q)
         milli_g = (_int16(a / STANDARD_GRAVITY * 1000.0) for a in sample.acc)
-        body = rvc.PACKET.pack(self._index, -yaw, pitch, roll, *milli_g, 0, 0, 0)
-        self._index = (self._index + 1) % 256
+        index = round(sample.ticks / rvc.PERIOD_US) % 256
+        body = rvc.PACKET.pack(index, -yaw, pitch, roll, *milli_g, 0, 0, 0)
         return rvc.HEADER + body + bytes([sum(body) & 0xFF])
 
 

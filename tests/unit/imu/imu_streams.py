@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from foottrack_service import rotations
-from foottrack_service.imu.devices.bno08x import Bno08xDevice
-from foottrack_service.imu.devices.serial_devices import AsciiDevice, RawDevice, RvcDevice, SimulatedDevice
+from foottrack_service.imu.devices.plugged import DEVICES
+from foottrack_service.imu.devices.serial_devices import SimulatedDevice
 from foottrack_service.imu.formats import SERIAL_FORMATS
 from foottrack_service.imu.formats.bno08x import Bno08xDecoder
 from foottrack_service.imu.sample import Decoder, DeviceSample, gravity_in_device
-
-DEVICES: dict[str, Callable[[], SimulatedDevice]] = {
-    "ascii": AsciiDevice,
-    "rvc": RvcDevice,
-    "bno08x": Bno08xDevice,
-    "raw": RawDevice,
-}
 
 RESOLUTION = {
     # acc m/s^2, gyro rad/s, q
