@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -56,7 +57,7 @@ def swings(walk: Walk) -> list[Swing]:
     found = []
     for side in SIDES:
         prints = walk.plan.footprints[side]
-        for now, following in zip(prints, prints[1:], strict=False):
+        for now, following in pairwise(prints):
             if now.toe_off < walk.plan.start or following.strike > walk.plan.end:
                 continue
             toe_off, strike = (float(t) for t in walk.clock.time([now.toe_off, following.strike]))

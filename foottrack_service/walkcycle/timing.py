@@ -31,7 +31,7 @@ class Clock:
     def rate(self, time: npt.ArrayLike) -> Array:
         """Cycles per second."""
         t = np.clip(np.asarray(time, dtype=np.float64), 0.0, self.duration)
-        return np.asarray(self._rate(t))
+        return np.asarray(np.maximum(self._rate(t), 0.0))
 
     def time(self, phase: npt.ArrayLike) -> Array:
         """When a phase is reached, s; 0 for phases before the start, the duration for those after the end."""

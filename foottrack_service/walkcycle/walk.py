@@ -16,6 +16,7 @@ from scipy.interpolate import CubicSpline
 from foottrack_service import rotations as rot
 from foottrack_service.walkcycle.curves import smooth_step
 from foottrack_service.walkcycle.cycle import Cycle
+from foottrack_service.walkcycle.errors import PathError
 from foottrack_service.walkcycle.footprints import Footprint, Plan, plan_walk
 from foottrack_service.walkcycle.legs import close_leg, reachable_height
 from foottrack_service.walkcycle.path import Path
@@ -27,6 +28,8 @@ from foottrack_service.walkcycle.timing import Clock, make_clock
 Array = npt.NDArray[np.float64]
 
 _MOMENT_S = 5e-4
+_SLOWEST = 0.25
+"""Share of the cycle's period: no change of speed makes a cycle shorter than that."""
 
 
 @dataclass(frozen=True)
@@ -231,6 +234,22 @@ def walk_along(
     plan = plan_walk(cycle, path, steps, start=start, stop=stop)
     clock = make_clock(plan.start, plan.end, cycle.period, from_rest=start, to_rest=stop, speeds=speeds)
     return Walk(cycle, path, plan, clock)
+
+
+def walk_for(cycle: Cycle, path: Path, seconds: float, *, speeds: list[tuple[float, float]] | None = None) -> Walk:
+    """The longest walk from standing to standing that takes at most `seconds`. Raises PathError when not even one step
+    does, or when the path ends before."""
+    best: Walk | None = None
+    for steps in range(1, 2 + int(2.0 * seconds / (cycle.period * _SLOWEST))):
+        if steps * cycle.step > path.length + 1e-6:
+            break
+        walk = walk_along(cycle, path, steps, speeds=speeds)
+        if walk.duration > seconds:
+            break
+        best = walk
+    if best is None:
+        raise PathError(f"not one step of {cycle.step:.2f} m fits into {seconds:g} s and {path.length:.2f} m")
+    return best
 
 
 def close_legs(body: Humanoid, times: Array, targets: Targets) -> Motion:

@@ -66,12 +66,12 @@ class BodyTrack:
 
 def stage_place(places: npt.ArrayLike) -> Array:
     """Model to stage: half a turn about +Y, (..., 3). Its own inverse."""
-    return np.asarray(places, dtype=np.float64) * np.array([-1.0, 1.0, -1.0])
+    return np.asarray(np.multiply(places, [-1.0, 1.0, -1.0]))
 
 
 def stage_rotation(q: npt.ArrayLike) -> Array:
     """The same for rotations (..., 4) of bodies whose own axes turn with it: ahead is -Z afterwards."""
-    return np.asarray(q, dtype=np.float64) * np.array([-1.0, 1.0, -1.0, 1.0])
+    return np.asarray(np.multiply(q, [-1.0, 1.0, -1.0, 1.0]))
 
 
 def body_track(walk: Walk, times: npt.ArrayLike) -> BodyTrack:
@@ -154,7 +154,7 @@ def wire_instants(walk: Walk, times: npt.ArrayLike) -> Iterator[Instant]:
                     phase = swing.phase(float(time))
             height = float(foot.ankle[i, 1]) - walk.body.ankle_height
             gaits[side] = FootGait(phase=phase, height=height, vy=float(v[1]))
-        walking = bool(rate[i] > 0.0)
+        walking = bool(rate[i] > 1e-6)
         ahead = rot.rotate(turn[i], [0.0, 0.0, -1.0])
         yield Instant(
             time=float(time),
