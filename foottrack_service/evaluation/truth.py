@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from foottrack_service import rotations as rot
 from foottrack_service.rotations import Array
+
+Flags = npt.NDArray[np.bool_]
 
 LONGEST_GAP_S = 0.05
 """Truth samples further apart are a hole: nothing is compared within it."""
@@ -36,8 +39,8 @@ class TruthTrack:
         self._seconds = (self.t - self._zero) * 1e-9
         self._p = CubicSpline(self._seconds, np.asarray(p, dtype=np.float64)[keep])
 
-    def covers(self, t: Array) -> Array:
-        """For each instant (ns), whether truth brackets it closely. Shape (n,), bool."""
+    def covers(self, t: Array) -> Flags:
+        """For each instant (ns), whether truth brackets it closely. Shape (n,)."""
         t = np.asarray(t)
         after = np.clip(np.searchsorted(self.t, t), 1, len(self.t) - 1)
         close = (self.t[after] - self.t[after - 1]) * 1e-9 <= LONGEST_GAP_S
