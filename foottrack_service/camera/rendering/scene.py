@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -114,6 +115,7 @@ def _unit(v: Array) -> Array:
     return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9))
 
 
+@lru_cache(maxsize=2)
 def floor_texture(seed: int) -> npt.NDArray[np.uint8]:
     """Grey carpet over FLOOR_TILE_M square: noise of several grains and a few seams, so that edges abound."""
     source = np.random.default_rng(seed)
