@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -21,19 +21,25 @@ class ChipAction(StrEnum):
 
 
 @app.command()
-def ports(as_json: JsonOption = False) -> None:
+def ports(
+    listen: Annotated[bool, typer.Option("--listen", help="Open each and say what IMU talks there.")] = False,
+    as_json: JsonOption = False,
+) -> None:
     """List the serial ports, as the setting `port` takes them.
 
-    Example: foottrack imu ports
+    Example: foottrack imu ports --listen
     """
     from foottrack_service.imu.ports import available
 
     found = available()
+    heard = {port.device: run_loop(_listened(port.device)) for port in found} if listen else {}
     if as_json:
-        print_json({"ports": [port._asdict() for port in found]})
+        print_json({"ports": [{**port._asdict(), **heard.get(port.device, {})} for port in found]})
         return
     for port in found:
-        typer.echo(f"{port}  {port.description}".rstrip())
+        says = heard.get(port.device, {})
+        told = says.get("error") or says.get("format") or ("no IMU" if says else "")
+        typer.echo(f"{port}  {port.description}  {told}".rstrip())
     if not found:
         typer.echo("no serial port: is the sensor plugged in, and its cable one for data?")
 
@@ -101,3 +107,12 @@ def chip(
     except NoAnswer as error:
         raise CommandFailed(str(error)) from None
     typer.echo("saved" if action == ChipAction.SAVE else "cleared, and restarted")
+
+
+async def _listened(device: str) -> dict[str, Any]:
+    from foottrack_service.imu.probe import probe
+
+    try:
+        return (await probe(device))._asdict()
+    except OSError as error:
+        return {"error": str(error)}

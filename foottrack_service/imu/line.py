@@ -29,8 +29,8 @@ class Line(Protocol):
     def write(self, data: bytes) -> None:
         """Hand bytes to the driver."""
 
-    def close(self) -> None:
-        """Let go of the port."""
+    async def close(self) -> None:
+        """Let go of the port: afterwards it can be opened again."""
 
 
 async def open_line(port: str, baud: int, on_data: OnData, on_lost: OnLost, clock: BusClock) -> Line:
@@ -72,17 +72,19 @@ def _open(port: str, baud: int, timeout_s: float) -> Any:
 
 class _Reader(asyncio.Protocol):
     def __init__(self, on_data: OnData, on_lost: OnLost, clock: BusClock) -> None:
-        self.closed = False
+        self.closing = False
+        self.gone = asyncio.Event()
         self._on_data = on_data
         self._on_lost = on_lost
         self._clock = clock
 
     def data_received(self, data: bytes) -> None:
-        self._on_data(data, self._clock())
+        if not self.closing:
+            self._on_data(data, self._clock())
 
     def connection_lost(self, exc: Exception | None) -> None:
-        if not self.closed:
-            self.closed = True
+        self.gone.set()
+        if not self.closing:
             self._on_lost(str(exc or "closed"))
 
 
@@ -94,12 +96,12 @@ class _AsynchronousLine:
     def write(self, data: bytes) -> None:
         self._transport.write(data)
 
-    def close(self) -> None:
-        if self._reader.closed:
-            return
-        self._reader.closed = True
-        # Not close(): that waits until all is written, which a line that is gone never does.
-        self._transport.abort()
+    async def close(self) -> None:
+        self._reader.closing = True
+        if not self._reader.gone.is_set():
+            # Not close(): that waits until all is written, which a line that is gone never does.
+            self._transport.abort()
+            await self._reader.gone.wait()
 
 
 class _ThreadedLine:
@@ -120,11 +122,11 @@ class _ThreadedLine:
         with suppress(OSError):
             self._device.write(data)
 
-    def close(self) -> None:
+    async def close(self) -> None:
         self._closed = True
         with suppress(OSError, AttributeError):
             self._device.cancel_read()
-        self._thread.join(_CLOSE_TIMEOUT_S)
+        await asyncio.to_thread(self._thread.join, _CLOSE_TIMEOUT_S)
         self._device.close()
 
     def _read(self) -> None:

@@ -102,7 +102,7 @@ class SerialLink:
                 task.cancel()
                 with suppress(asyncio.CancelledError):
                     await task
-            line.close()
+            await line.close()
             self.port = None
         self.losses += 1
         self._failed(f"{port} is gone: {reason}")

@@ -122,7 +122,7 @@ class SilentLine:
     def write(self, data: bytes) -> None:
         pass
 
-    def close(self) -> None:
+    async def close(self) -> None:
         SilentLine.closed = True
 
 
