@@ -17,7 +17,7 @@ from foottrack_protocol.system import USER_PATTERN
 DEFAULT_USER = "user"
 SYSTEM = "sys"
 WELCOME = b"sys/welcome"
-"""What the egress socket says to a new subscriber; this and ``sys/welcome/<token>`` are the only messages of one frame."""
+"""What the egress socket says to a new subscriber: with ``sys/welcome/<token>`` the only message of one frame."""
 
 _USER = re.compile(USER_PATTERN)
 

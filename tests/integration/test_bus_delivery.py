@@ -307,7 +307,8 @@ def test_a_flood_starves_neither_the_loop_nor_another_subscriber(run: Run, bus: 
                 await asyncio.sleep(0)
 
         await asyncio.gather(read_flood(), read_other(), count_turns())
-        assert turns >= flood // BATCH
+        # The last batch ends the reading: the turns are between the batches.
+        assert turns >= flood // BATCH - 1
         assert taken_before_other <= BATCH
 
     run(scenario())
