@@ -53,6 +53,11 @@ def expected(gold: dict[str, Any]) -> dict[int, np.ndarray]:
     return {int(name): np.array(values, dtype=float).reshape(4, 2) for name, values in gold["corners"].items()}
 
 
+def slack(gold: dict[str, Any]) -> float:
+    """Ours are refined; where gold is the contour's whole pixels, these are up to half a pixel off by themselves."""
+    return 0.0 if "refine" in gold else 0.3
+
+
 @pytest.mark.parametrize("name", list(GOLD))
 def test_every_marker_is_found_where_it_is(name: str) -> None:
     gold = GOLD[name]
@@ -60,8 +65,7 @@ def test_every_marker_is_found_where_it_is(name: str) -> None:
     found = {d.id: d.corners for d in TagDetector(dictionary, range(len(dictionary.bytesList))).search(grey(name))}
     assert len(found) == gold["count"]
     for tag, corners in expected(gold).items():
-        # Gold without refinement is rounded to whole pixels, on contours.
-        assert np.abs(found[tag] - corners).max() <= gold["tolerance_px"] + (0.5 if "refine" not in gold else 0.25)
+        assert np.abs(found[tag] - corners).max() <= gold["tolerance_px"] + slack(gold)
 
 
 @pytest.mark.parametrize("name", list(GOLD))
@@ -75,7 +79,7 @@ def test_windows_find_what_the_whole_picture_shows(name: str) -> None:
         high = np.minimum(corners.max(axis=0) + 0.7 * side, (width, height)).astype(int)
         found = {d.id: d.corners for d in detector.look(picture, Window(*low, *high, side))}
         assert tag in found
-        assert np.abs(found[tag] - corners).max() <= gold["tolerance_px"] + (1.0 if "refine" not in gold else 0.4)
+        assert np.abs(found[tag] - corners).max() <= gold["tolerance_px"] + slack(gold)
 
 
 def chessboards(**options: Any) -> list[Any]:
