@@ -15,7 +15,7 @@ import numpy as np
 
 from foottrack_service.fusion.compiled import compiled
 from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE
-from foottrack_service.fusion.foot_filter_kernel import GRAVITY
+from foottrack_service.fusion.foot_filter_kernel import GRAVITY, rotation, turned
 from foottrack_service.rotations import Array
 
 WINDOW_NS = 80_000_000
@@ -34,18 +34,25 @@ STILL_SIGMA = 0.005
 SIGMA_GROWTH = 0.02
 """m/s per unit of the statistic."""
 
-# memory, shape (2,): the swing's peak that fades, and the statistic of the newest sample
-PEAK, STATISTIC = 0, 1
+PUSH, PUSH_SHARE = 0.5, 0.3
+"""m/s^2, and per unit of the statistic: who is pushed by more, beyond what the tilt is unsure by, does not stand."""
+DOUBT_S = 1.0
+"""A push that lasts for longer, in silence, is no push but a wrong tilt."""
+
+# memory, shape (3,): the swing's peak that fades, the newest sample's statistic, how long it was pushed
+PEAK, STATISTIC, DOUBTED = 0, 1, 2
 
 
 @compiled
-def stillness(t: Array, rows: Array, i: int) -> float:
+def stillness(t: Array, rows: Array, i: int, mean: Array) -> float:
     """The statistic over the window that ends at the IMU row i (0: as still as can be); inf before there is one.
 
+    Writes the mean specific force, m/s^2, into ``mean``, shape (3,).
     Rates that are differences of a device's own attitude carry its corrections: they are averaged over half a window.
     """
     n = 0
-    mean, halves = np.zeros(3), np.zeros((2, 3))
+    mean[:] = 0.0
+    halves = np.zeros((2, 3))
     counts = np.zeros(2)
     square, rate = 0.0, 0.0
     j = i
@@ -63,7 +70,8 @@ def stillness(t: Array, rows: Array, i: int) -> float:
         j -= 1
     if j < 0 or n < LEAST_SAMPLES:
         return math.inf
-    norm2 = (mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2]) / (n * n)
+    mean /= n
+    norm2 = mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2]
     spread2 = max(0.0, square / n - norm2)
     off = math.sqrt(norm2) - GRAVITY
     if rows[i, MEAN_RATE] == 1.0:
@@ -76,16 +84,30 @@ def stillness(t: Array, rows: Array, i: int) -> float:
 
 
 @compiled
-def stance_sigma(t: Array, rows: Array, i: int, dt: float, memory: Array) -> float:
+def stance_sigma(t: Array, rows: Array, i: int, dt: float, x: Array, P: Array, memory: Array) -> float:
     """How well the foot's velocity is known to be zero at the IMU row i, m/s per 10 ms; 0.0 when it swings.
 
-    ``dt``, s, since the last sample; ``memory``, shape (2,), is carried from sample to sample.
+    ``dt``, s, since the last sample; ``x`` and ``P`` the filter before it; ``memory``, shape (3,), is carried from
+    sample to sample.
     """
-    statistic = stillness(t, rows, i)
+    mean = np.empty(3)
+    statistic = stillness(t, rows, i, mean)
     memory[STATISTIC] = statistic
     if not math.isfinite(statistic):
         return 0.0
     memory[PEAK] = max(memory[PEAK] * math.exp(-dt / SWING_MEMORY_S), statistic)
-    if statistic < max(QUIET, SHARE_OF_SWING * memory[PEAK]):
-        return STILL_SIGMA + SIGMA_GROWTH * statistic
-    return 0.0
+    if statistic >= max(QUIET, SHARE_OF_SWING * memory[PEAK]):
+        memory[DOUBTED] = 0.0
+        return 0.0
+    # A smooth push sideways hardly changes |f|, but it shows against what the filter knows to be up.
+    R = np.empty((3, 3))
+    rotation(x[6:10], R)
+    a = turned(R, mean - x[10:13])
+    a[1] -= GRAVITY
+    tilt = math.sqrt(P[6, 6] + P[8, 8])
+    pushed = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    if pushed > PUSH + PUSH_SHARE * statistic + 3.0 * GRAVITY * tilt:
+        memory[DOUBTED] += dt
+        if memory[DOUBTED] < DOUBT_S:
+            return 0.0
+    return STILL_SIGMA + SIGMA_GROWTH * statistic

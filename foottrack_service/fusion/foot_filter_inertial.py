@@ -138,7 +138,7 @@ class InertialFilter:
         i = timeline.append(t)
         self._fill(timeline.rows[i], sample, dt)
         row = timeline.rows[i]
-        sigma = stance_sigma(timeline.t, timeline.rows, i, dt, self._memory)
+        sigma = stance_sigma(timeline.t, timeline.rows, i, dt, timeline.X[i - 1], timeline.P[i - 1], self._memory)
         if sigma > 0.0:
             row[ZERO_SIGMA] = math.hypot(sigma, self._drift)
             row[QUIET_FLAG] = float(self._memory[STATISTIC] < QUIET_STATISTIC and self._drift == 0.0)
@@ -182,7 +182,7 @@ class InertialFilter:
             rejected = Rejected(
                 t, row[POINT : POINT + 3].copy(), found[2:5].copy(), turn, sigma, row[ARM : ARM + 3].copy()
             )
-            agreed = self._candidates[fix.kind].add(rejected, self._sure(P, t, fix.kind))
+            agreed = self._candidates[fix.kind].add(rejected, self._sure_for(P, t, fix.kind))
             if agreed is not None:
                 self._restart_from(agreed, fix)
                 return Verdict.ACCEPTED
@@ -259,7 +259,7 @@ class InertialFilter:
     def _forget(self) -> None:
         self._timeline.n = 0
         self._imu_t, self._behind = 0, 0
-        self._memory, self._lock = np.zeros(2), np.zeros(9)
+        self._memory, self._lock = np.zeros(3), np.zeros(9)
         self._last: Array = np.zeros(1)
         self._q: Array | None = None
         self.acquired, self._seen_yaw = False, False
@@ -362,12 +362,15 @@ class InertialFilter:
             if speed > SLOPE_NOISE:
                 self._drift = speed
 
-    def _sure(self, P: Array, t: int, kind: Kind) -> bool:
-        """Whether the foot knows its place so well that fixes of this kind must insist. A blob never outdoes a tag."""
+    def _sure_for(self, P: Array, t: int, kind: Kind) -> float | None:
+        """Seconds since the last accepted fix, of a foot that knows its place so well that others must insist.
+
+        A blob never makes a tag insist.
+        """
         by = [self._fix_t[k] for k in (("marker",) if kind == "marker" else self._fix_t) if k in self._fix_t]
         if not self.acquired or not by or (t - max(by)) * 1e-9 > SURE_AGE_S:
-            return False
-        return math.sqrt(max(P[0, 0], P[1, 1], P[2, 2])) < SURE_SIGMA
+            return None
+        return (t - max(by)) * 1e-9 if math.sqrt(max(P[0, 0], P[1, 1], P[2, 2])) < SURE_SIGMA else None
 
     def _restart_from(self, agreed: list[Rejected], fix: OpticalFix) -> None:
         """Begin anew at the oldest of the fixes that agree, and take them all."""

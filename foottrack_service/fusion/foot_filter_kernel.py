@@ -61,6 +61,15 @@ def rotation(q: Array, R: Array) -> None:
 
 
 @compiled
+def turned(R: Array, v: Array) -> Array:
+    """R v, shape (3,)."""
+    out = np.empty(3)
+    for i in range(3):
+        out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
+    return out
+
+
+@compiled
 def turn_body(q: Array, rx: float, ry: float, rz: float) -> None:
     """q <- q exp(r), r a rotation vector in the body's frame, in place; the result is unit."""
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
@@ -86,9 +95,7 @@ def turn_stage(q: Array, rx: float, ry: float, rz: float) -> None:
 
 
 @compiled
-def propagate(
-    x: Array, P: Array, acc: Array, gyro: Array, step: float, clipped: bool, fused: bool, dt: float
-) -> None:
+def propagate(x: Array, P: Array, acc: Array, gyro: Array, step: float, clipped: bool, fused: bool, dt: float) -> None:
     """Carry x and P forward by dt, s, in place.
 
     ``acc`` (m/s^2) and ``gyro`` (rad/s), shape (3,), are means over the interval, ``step`` (m/s^2) is how far the

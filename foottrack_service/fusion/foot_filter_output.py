@@ -12,8 +12,8 @@ import numpy as np
 
 from foottrack_service.fusion.compiled import compiled
 from foottrack_service.fusion.foot_filter_events import ACC, CLIPPED, GYRO, ZERO_SIGMA
-from foottrack_service.fusion.foot_filter_kernel import GRAVITY, rotation, turn_body
-from foottrack_service.fusion.foot_filter_replay import ANKLE_ARM, turned
+from foottrack_service.fusion.foot_filter_kernel import GRAVITY, rotation, turn_body, turned
+from foottrack_service.fusion.foot_filter_replay import ANKLE_ARM
 from foottrack_service.rotations import Array
 
 LONGEST_HOLD_S = 0.02

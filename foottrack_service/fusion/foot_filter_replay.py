@@ -43,6 +43,7 @@ from foottrack_service.fusion.foot_filter_kernel import (
     propagate,
     rotation,
     turn_stage,
+    turned,
     update1,
     update3,
 )
@@ -55,8 +56,10 @@ HOLE_S = 0.1
 """A longer silence of the IMU is not integrated across."""
 HOLE_SPEED = 1.5
 """m/s SD: what a foot does meanwhile."""
-HOLE_RATE = 1.0
-"""rad/s SD of a foot whose IMU has no attitude of its own."""
+HOLE_FADE_S = 0.15
+"""How soon a foot that nobody measures has forgotten its speed."""
+HOLE_WALK, FUSED_HOLE_WALK = 0.7, 0.03
+"""rad/sqrt(s): how an attitude that nobody measures wanders; and that of a device which keeps its own."""
 LONGEST_HOLE_S = 1.0
 ZERO_GATE = 30.0
 """A stance never overrules a velocity that is clearly known: chi-square, 3 degrees of freedom."""
@@ -90,7 +93,7 @@ def replay(t: Array, rows: Array, X: Array, P: Array, start: int, end: int, geom
         P[i] = P[i - 1]
         dt = (t[i] - t[i - 1]) * 1e-9
         if dt > 0.0:
-            _advance(rows, X[i], P[i], i, end, dt)
+            _advance(t, rows, X[i], P[i], i, end, dt)
         kind = rows[i, KIND]
         if kind == IMU:
             _inertial_updates(rows[i], X[i], P[i], min(dt, HOLE_S), geometry)
@@ -99,15 +102,6 @@ def replay(t: Array, rows: Array, X: Array, P: Array, start: int, end: int, geom
         elif rows[i, ACCEPTED] == 1.0:
             fix_updates(rows[i], X[i], P[i], _rate(rows, X[i], i, end))
         floor_covariance(P[i], smallest)
-
-
-@compiled
-def turned(R: Array, v: Array) -> Array:
-    """R v, shape (3,)."""
-    out = np.empty(3)
-    for i in range(3):
-        out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
-    return out
 
 
 @compiled
@@ -194,7 +188,7 @@ def _rate(rows: Array, x: Array, i: int, end: int) -> Array:
 
 
 @compiled
-def _advance(rows: Array, x: Array, P: Array, i: int, end: int, dt: float) -> None:
+def _advance(t: Array, rows: Array, x: Array, P: Array, i: int, end: int, dt: float) -> None:
     """Carry the state over the dt before event i."""
     before = _neighbour(rows, i, -1, end)
     after = i if rows[i, KIND] == IMU else _neighbour(rows, i, 1, end)
@@ -212,25 +206,39 @@ def _advance(rows: Array, x: Array, P: Array, i: int, end: int, dt: float) -> No
         acc[k] = 0.5 * (a0 + a1)
         gyro[k] = 0.5 * (rows[held, GYRO + k] + rows[after, GYRO + k])
         step += (a1 - a0) * (a1 - a0)
-    if dt <= HOLE_S:
+    fused = rows[after, MEAN_RATE] == 1.0
+    if (t[after] - t[before]) * 1e-9 <= HOLE_S and dt <= HOLE_S:
         clipped = rows[before, CLIPPED] == 1.0 or rows[after, CLIPPED] == 1.0
-        propagate(x, P, acc, gyro, math.sqrt(step), clipped, rows[after, MEAN_RATE] == 1.0, dt)
-        return
-    own_attitude = rows[after, MEAN_RATE] == 1.0
-    if own_attitude:
-        spin = np.empty((3, 3))
-        rotation(x[6:10], spin)
-        turn = turned(spin, gyro)
+        propagate(x, P, acc, gyro, math.sqrt(step), clipped, fused, dt)
+    else:
+        _coast(x, P, gyro, fused, dt)
+
+
+@compiled
+def _coast(x: Array, P: Array, gyro: Array, fused: bool, dt: float) -> None:
+    """Across a hole: the speed fades and wanders; a device with an attitude of its own still tells the turn."""
+    if fused:
+        R = np.empty((3, 3))
+        rotation(x[6:10], R)
+        turn = turned(R, gyro)
         turn_stage(x[6:10], turn[0] * dt, turn[1] * dt, turn[2] * dt)
-    hole = min(dt, LONGEST_HOLE_S)
+    fade = math.exp(-dt / HOLE_FADE_S)
+    reach = HOLE_FADE_S * (1.0 - fade)
     for k in range(3):
-        x[3 + k] = 0.0
+        x[k] += reach * x[3 + k]
+        x[3 + k] *= fade
         for j in range(NE):
-            P[3 + k, j] = 0.0
-            P[j, 3 + k] = 0.0
-        P[3 + k, 3 + k] = HOLE_SPEED**2
-        P[k, k] += (HOLE_SPEED * hole) ** 2
-        P[6 + k, 6 + k] += (0.02 if own_attitude else HOLE_RATE * hole) ** 2
+            P[k, j] += reach * P[3 + k, j]
+            P[3 + k, j] *= fade
+    for k in range(3):
+        for j in range(NE):
+            P[j, k] += reach * P[j, 3 + k]
+            P[j, 3 + k] *= fade
+    capped = min(dt, LONGEST_HOLE_S)
+    for k in range(3):
+        P[k, k] += 2.0 * HOLE_SPEED**2 * HOLE_FADE_S * max(capped - reach, 0.0)
+        P[3 + k, 3 + k] += HOLE_SPEED**2 * (1.0 - fade * fade)
+        P[6 + k, 6 + k] += capped * (FUSED_HOLE_WALK if fused else HOLE_WALK) ** 2
 
 
 @compiled

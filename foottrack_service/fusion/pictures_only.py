@@ -73,7 +73,7 @@ class PicturesOnlyFilter:
         variance = float(np.trace(fix.cov)) / 3.0 + PICTURE_NOISE**2
         attitude = self._attitude(fix)
         if self.newest is None:
-            agreed = self._candidates.add(Rejected(fix.t, z, z, None, math.sqrt(variance), self._arm), sure=False)
+            agreed = self._candidates.add(Rejected(fix.t, z, z, None, math.sqrt(variance), self._arm), sure_for=None)
             if agreed is None:
                 return Verdict.UNCONFIRMED
             self._begin(agreed, variance, attitude)
@@ -83,7 +83,7 @@ class PicturesOnlyFilter:
         residual = z - state[0]
         if float(residual @ residual) > CHI_SQUARE_3 * (P[0, 0] + variance):
             agreed = self._candidates.add(
-                Rejected(fix.t, z, residual, None, math.sqrt(variance), self._arm), sure=False
+                Rejected(fix.t, z, residual, None, math.sqrt(variance), self._arm), sure_for=None
             )
             if agreed is None:
                 return Verdict.GATE
