@@ -7,9 +7,11 @@ import sys
 import typer
 
 from foottrack_protocol.errors import ProtocolError
+from foottrack_service.app import NodeFailed
 from foottrack_service.bus.errors import BusError
-from foottrack_service.cli import bench, calibrate, demo, imu, log, recordings, running, service, sim, watch
+from foottrack_service.cli import bench, calibrate, demo, evaluate, imu, log, recordings, running, service, sim, watch
 from foottrack_service.config import ConfigError
+from foottrack_service.evaluation.datasets import DatasetError
 from foottrack_service.recording.errors import RecordingError
 
 app = typer.Typer(
@@ -26,6 +28,7 @@ app.command()(recordings.record)
 app.command()(recordings.replay)
 app.command()(watch.top)
 app.command()(watch.echo)
+app.command()(evaluate.evaluate)
 app.command()(bench.bench)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(imu.app, name="imu")
@@ -41,7 +44,7 @@ def main() -> None:
         running.fail(str(error), error.code)
     except ConfigError as error:
         running.fail(str(error), running.EXIT_USAGE)
-    except (BusError, ProtocolError, RecordingError) as error:
+    except (BusError, ProtocolError, RecordingError, NodeFailed, DatasetError) as error:
         running.fail(str(error))
     except BrokenPipeError:
         sys.stderr.close()

@@ -123,8 +123,11 @@ async def _show_recording(started: asyncio.Future[RecordingWriter], file: Path) 
 
 
 async def _replay(settings: Settings, file: Path, rate: float, loop: bool, results: bool, user: str | None) -> None:
+    # All before the first message is due: an import in the running loop would hold it up.
     from foottrack_protocol.topics import Role
+    from foottrack_service.bus import control  # noqa: F401
     from foottrack_service.bus.connection import Bus
+    from foottrack_service.cli import keys  # noqa: F401
     from foottrack_service.recording.play import play
     from foottrack_service.recording.reader import open_recording
 

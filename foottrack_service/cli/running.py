@@ -7,8 +7,7 @@ import json
 import logging
 import signal
 import sys
-from collections.abc import Coroutine, Iterator
-from contextlib import contextmanager
+from collections.abc import Coroutine
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, TypeVar
 
@@ -62,8 +61,8 @@ def run_loop(work: Coroutine[Any, Any, T]) -> T:
 
     Raises KeyboardInterrupt after that, so that a command can end as one that was told to.
     """
-    with asyncio.Runner(loop_factory=asyncio.SelectorEventLoop) as runner, _terminate_as_interrupt():
-        return runner.run(work)
+    with asyncio.Runner(loop_factory=asyncio.SelectorEventLoop) as runner:
+        return runner.run(_until_told(work))
 
 
 def print_json(values: Any) -> None:
@@ -92,14 +91,24 @@ def fail(text: str, code: int = EXIT_FAILED) -> NoReturn:
     raise SystemExit(code)
 
 
-@contextmanager
-def _terminate_as_interrupt() -> Iterator[None]:
-    def interrupt(_signal: int, _frame: object) -> None:
-        signal.raise_signal(signal.SIGINT)
+async def _until_told(work: Coroutine[Any, Any, T]) -> T:
+    """SIGTERM is taken like Ctrl-C, also where a shell started us in the background with SIGINT ignored."""
+    loop = asyncio.get_running_loop()
+    task = asyncio.ensure_future(work)
+    terminated = False
 
-    before = signal.signal(signal.SIGTERM, interrupt)
+    def terminate() -> None:
+        nonlocal terminated
+        terminated = True
+        task.cancel()
+
+    before = signal.signal(signal.SIGTERM, lambda *_: loop.call_soon_threadsafe(terminate))
     try:
-        yield
+        return await task
+    except asyncio.CancelledError:
+        if terminated:
+            raise KeyboardInterrupt from None
+        raise
     finally:
         signal.signal(signal.SIGTERM, before)
 

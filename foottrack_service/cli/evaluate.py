@@ -1,0 +1,234 @@
+"""``foottrack evaluate``: how good the filters are, beside the published system."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from foottrack_service.cli.running import EXIT_USAGE, CommandFailed, JsonOption, print_json
+
+_WIDTH = 140
+_FIGURES = ("mean", "median", "p95", "max")
+DEFAULT_SECTIONS = ("tasks", "technical", "study")
+
+
+def evaluate(
+    file: Annotated[
+        Path | None, typer.Argument(help="A recording that carries truth/left or truth/right; simulations if absent.")
+    ] = None,
+    tasks: Annotated[str | None, typer.Option("--tasks", help="Some tasks only, with commas between.")] = None,
+    seeds: Annotated[str, typer.Option("--seeds", help="Seeds of the simulations, with commas between.")] = "1,2",
+    sections: Annotated[
+        str, typer.Option("--sections", help="Of tasks, technical, study, variants, gaps; or all.")
+    ] = ",".join(DEFAULT_SECTIONS),
+    real: Annotated[
+        Path | None, typer.Option("--real", help="Instead: real recordings of foot-worn IMUs in this folder.")
+    ] = None,
+    plot: Annotated[Path | None, typer.Option("--plot", help="Draw error over time into this folder (PNG).")] = None,
+    html: Annotated[Path | None, typer.Option("--html", help="Write one page with tables and pictures.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Errors, lag, jitter and skate of our filter and of the published one, with the published figures.
+
+    Examples: foottrack evaluate --tasks walk,still --seeds 7,8,9; foottrack evaluate session.mcap --plot out
+    """
+    if real is not None:
+        from foottrack_service.evaluation.real import real_tables
+
+        results: dict[str, Any] = {"real": real_tables(real)}
+    elif file is not None:
+        from foottrack_service.evaluation.recorded import recorded_tables
+
+        results = {"tasks": {file.stem: recorded_tables(file)}}
+    else:
+        results = _simulated(_chosen_tasks(tasks), _chosen_seeds(seeds), _chosen_sections(sections), as_json)
+    if plot is not None or html is not None:
+        _draw(results, file, _chosen_tasks(tasks), _chosen_seeds(seeds)[0], plot, html)
+    if as_json:
+        print_json(results)
+    else:
+        show(results)
+
+
+def show(results: dict[str, Any], console: Console | None = None) -> None:
+    """Print all tables."""
+    from foottrack_service.evaluation.published import NOTES
+
+    console = console or Console(width=None if sys.stdout.isatty() else _WIDTH)
+    for table in _as_tables(results):
+        console.print(table, "")
+    if "technical" in results:
+        console.print("Why a row differs from the published one:")
+        for task, note in NOTES.items():
+            console.print(f"  {task}: {note}")
+
+
+def _draw(
+    results: dict[str, Any], file: Path | None, tasks: list[str], seed: int, plot: Path | None, html: Path | None
+) -> None:
+    from foottrack_service.evaluation.plots import page, recording_pictures, task_pictures
+
+    pictures: dict[str, bytes] = {}
+    if file is not None:
+        pictures = recording_pictures(file)
+    elif "real" not in results:
+        with Progress(console=Console(stderr=True), transient=True) as progress:
+            for task in progress.track(tasks, description="drawing"):
+                pictures.update(task_pictures(task, seed))
+    if plot is not None:
+        plot.mkdir(parents=True, exist_ok=True)
+        for name, png in pictures.items():
+            (plot / name).write_bytes(png)
+        typer.echo(f"Drew {len(pictures)} pictures into {plot}.", err=True)
+    if html is not None:
+        text = io.StringIO()
+        show(results, Console(file=text, width=_WIDTH))
+        html.write_text(page(text.getvalue(), pictures), encoding="utf-8")
+        typer.echo(f"Wrote {html}.", err=True)
+
+
+def _simulated(tasks: list[str], seeds: list[int], sections: list[Any], quiet: bool) -> dict[str, Any]:
+    from foottrack_service.evaluation.sections import jobs_of, run_jobs, tables
+
+    jobs = [job for section in sections for job in jobs_of(section, tasks, seeds)]
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet) as progress:
+        bar = progress.add_task("simulating and fusing", total=len(set(jobs)))
+        results = run_jobs(jobs, lambda done: progress.update(bar, advance=1, description=done.job.task))
+    found: dict[str, Any] = {section: tables(section, results, tasks, seeds) for section in sections}
+    found.setdefault("tasks", {})
+    return found
+
+
+def _chosen_tasks(text: str | None) -> list[str]:
+    from foottrack_service.evaluation.sections import all_tasks
+
+    known = all_tasks()
+    chosen = known if text is None else [name.strip() for name in text.split(",") if name.strip()]
+    for name in chosen:
+        if name not in known:
+            raise CommandFailed(f"no task is called {name!r}; there are: {', '.join(known)}", EXIT_USAGE)
+    return chosen
+
+
+def _chosen_seeds(text: str) -> list[int]:
+    try:
+        chosen = [int(part) for part in text.split(",") if part.strip()]
+        if not chosen or min(chosen) < 0:
+            raise ValueError
+    except ValueError:
+        raise CommandFailed(
+            f"--seeds takes whole numbers from 0 with commas between, not {text!r}", EXIT_USAGE
+        ) from None
+    return chosen
+
+
+def _chosen_sections(text: str) -> list[Any]:
+    from foottrack_service.evaluation.sections import SECTIONS
+
+    if text == "all":
+        return list(SECTIONS)
+    chosen = [name.strip() for name in text.split(",") if name.strip()]
+    for name in chosen:
+        if name not in SECTIONS:
+            raise CommandFailed(f"no section is called {name!r}; there are: {', '.join(SECTIONS)}, all", EXIT_USAGE)
+    return chosen
+
+
+def _as_tables(results: dict[str, Any]) -> list[Table]:
+    shown = []
+    if results.get("tasks"):
+        shown.append(_task_table("Error of the foot, mm; lag, ms (100 Hz, mild feet)", results["tasks"]))
+    for label, rows in results.get("variants", {}).items():
+        shown.append(_task_table(f"The same, {label}", rows))
+    if "technical" in results:
+        shown.append(_technical_table(results["technical"]))
+    if "study" in results:
+        shown.append(_study_table(results["study"]))
+    if "gaps" in results:
+        shown.append(_gap_table(results["gaps"]))
+    if "real" in results:
+        shown.append(_plain_table("Real recordings", results["real"]))
+    return shown
+
+
+def _task_table(title: str, rows: dict[str, Any]) -> Table:
+    table = Table(title=title, title_justify="left")
+    for name in ("task", "filter"):
+        table.add_column(name, no_wrap=True)
+    for name in (*_FIGURES, "lag", "jitter", "skate", "in 1, 2, 3 sigma"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for task, row in rows.items():
+        for index, (name, values) in enumerate(row.items()):
+            shares = values.get("within_sigma") or {}
+            table.add_row(
+                task if index == 0 else "",
+                name,
+                *(_text(values.get(key)) for key in (*_FIGURES, "lag", "jitter", "skate")),
+                " ".join(f"{100 * share:.0f}" for share in shares.values()),
+                end_section=index == len(row) - 1,
+            )
+    return table
+
+
+def _technical_table(rows: dict[str, Any]) -> Table:
+    table = Table(title="[B]'s technical tests by the source that is left, mm; [B]'s latency, ms", title_justify="left")
+    for name in ("test", "source", "filter"):
+        table.add_column(name, no_wrap=True)
+    for name in ("mean", "max", "onset to peak", "true lag"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for task, sources in rows.items():
+        for source, row in sources.items():
+            for index, (name, values) in enumerate(row.items()):
+                cells = (_text(values.get(key)) for key in ("mean", "max", "peak_delay", "lag"))
+                table.add_row(task, source, name, *cells, end_section=index == len(row) - 1)
+    return table
+
+
+def _study_table(rows: dict[str, Any]) -> Table:
+    table = Table(title="[B]'s user study, the left foot without IMU, mm", title_justify="left")
+    for name in ("task", "foot", "filter"):
+        table.add_column(name, no_wrap=True)
+    for name in _FIGURES:
+        table.add_column(name, justify="right")
+    for task, sides in rows.items():
+        for side, row in sides.items():
+            for index, (name, values) in enumerate(row.items()):
+                cells = (_text(values.get(key)) for key in _FIGURES)
+                table.add_row(task, side, name, *cells, end_section=index == len(row) - 1)
+    return table
+
+
+def _gap_table(rows: dict[str, Any]) -> Table:
+    table = Table(title="Error at the end of a dark camera's gap in a walk, mm", title_justify="left")
+    for name in ("gap, s", "filter", "median", "p90"):
+        table.add_column(name, justify="right")
+    for gap, row in rows.items():
+        for name, values in row.items():
+            table.add_row(gap, name, _text(values["median"]), _text(values["p90"]))
+    return table
+
+
+def _plain_table(title: str, rows: dict[str, dict[str, Any]]) -> Table:
+    table = Table(title=title, title_justify="left")
+    names = list(dict.fromkeys(key for row in rows.values() for key in row))
+    for name in ("recording", *names):
+        table.add_column(name, justify="left" if name == "recording" else "right")
+    for label, row in rows.items():
+        table.add_row(label, *(_text(row.get(name)) for name in names))
+    return table
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        return f"{value:.1f}" if abs(value) >= 10.0 else f"{value:.2f}"
+    return str(value)
