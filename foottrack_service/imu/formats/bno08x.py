@@ -20,6 +20,9 @@ QUATERNION_SLACK = 0.05
 MAX_AGE_US = 1_000_000
 """Reports are never batched: an older one has a damaged time base."""
 
+MIN_INTERVAL_US, MAX_INTERVAL_US = 500, 1_000_000
+"""What the chip can be set to, for these sensors."""
+
 REPLY_S = 1.0
 """After a reset or a Set Feature without an answer, it is sent again; a reset takes a few tenths."""
 
@@ -35,7 +38,8 @@ class Bno08xDecoder(Decoder):
 
     The chip stamps nothing absolute: its clock here is the accelerometer's sequence number times the interval that it
     announced. Reports of one cycle belong together by their own sequence numbers, so a lost one shifts nothing.
-    Drops: those of ``ShtpReceiver``, ``report_id``, ``report_length``, ``age``, ``quaternion``, ``unpaired``.
+    Drops: those of ``ShtpReceiver``, ``report_id``, ``report_length``, ``age``, ``interval``, ``quaternion``,
+    ``unpaired``.
     """
 
     def __init__(self, interval_us: int = 2500) -> None:
@@ -101,7 +105,9 @@ class Bno08xDecoder(Decoder):
         feature = sh2.read_feature(cargo.payload)
         if feature is not None and feature[0] in sh2.SENSORS:
             sensor, interval_us = Report(feature[0]), feature[1]
-            if interval_us == 0:
+            if not MIN_INTERVAL_US <= interval_us <= MAX_INTERVAL_US:
+                # Turned off, or damaged on the way: ask again.
+                self.drops["interval"] += 1
                 self._missing.add(sensor)
                 return
             self._missing.discard(sensor)

@@ -93,6 +93,19 @@ def test_the_rate_that_the_device_chose_is_the_clocks() -> None:
     assert sample.ticks == 0
 
 
+@pytest.mark.parametrize("interval_us", [0, 1, 2**31])
+def test_a_report_that_was_turned_off_or_an_interval_that_cannot_be_is_asked_for_again(interval_us: int) -> None:
+    decoder, device = configured()
+    answer = sh2.feature_response(Report.ACCELEROMETER, interval_us)
+    assert decoder.feed(ShtpSender().frame(Channel.CONTROL, answer)) == []
+    assert decoder.clock.tick_us == 2500.0
+    (again,) = decoder.to_send(100.0)
+    device.intervals_us.clear()
+    decoder.feed(device.hear(again))
+    assert device.intervals_us == {Report.ACCELEROMETER: 2500}
+    assert decoder.drops["interval"] == 1
+
+
 def test_after_a_brown_out_it_is_configured_again() -> None:
     decoder, device = configured()
     samples = motion(4, 2500)
