@@ -6,6 +6,7 @@ import base64
 import html
 import io
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +72,8 @@ def page(tables: str, pictures: dict[str, bytes]) -> str:
     )
     return (
         '<!doctype html><html lang="en"><meta charset="utf-8"><title>foottrack evaluation</title>'
-        "<style>body{font:15px sans-serif;margin:2em}pre{font:13px monospace;overflow-x:auto}img{max-width:100%}</style>"
+        "<style>body{font:15px sans-serif;margin:2em}pre{font:13px monospace;overflow-x:auto}"
+        "img{max-width:100%}</style>"
         f"<h1>foottrack evaluation</h1><pre>{html.escape(tables)}</pre>{shown}</html>\n"
     )
 
@@ -118,7 +120,7 @@ def _shade(axis: Any, seconds: Array, stage: Array) -> None:
         return
     gap = np.diff(seconds) > 0.1
     edges = np.concatenate([[0], 1 + np.flatnonzero((np.diff(stage) != 0) | gap), [len(stage)]])
-    for begin, end in zip(edges[:-1], edges[1:], strict=True):
+    for begin, end in pairwise(edges):
         # A hole in the outputs stays white.
         stop = end if end < len(seconds) and not gap[end - 1] else end - 1
         axis.axvspan(seconds[begin], seconds[stop], color=_STAGE_COLOURS[int(stage[begin])], lw=0)
