@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,15 +58,16 @@ class Plan:
 def plan_walk(cycle: Cycle, path: Path, steps: int | None = None, *, start: bool = True, stop: bool = True) -> Plan:
     """Footprints along a path.
 
-    Without `steps`, the walk covers the path with steps that fit it (the cycle's own, shortened or stretched to end
-    exactly at its end); with, it takes that many steps of the cycle's length. With `start` it sets off from standing
+    Without `steps`, the walk covers the path with steps that fit it (the cycle's own, shortened to end exactly at
+    its end); with, it takes that many steps of the cycle's length. With `start` it sets off from standing
     with the right foot, with `stop` the last step closes the feet. Raises PathError when the path is too short.
     """
     step = cycle.step
     if steps is None:
         if path.length < step:
             raise PathError(f"the path is {path.length:.2f} m long, shorter than one step of {step:.2f} m")
-        steps = max(1, round(path.length / step))
+        # Rather a little shorter than stretched: legs that are nearly straight have no length to spare.
+        steps = max(1, math.ceil(path.length / step - 0.02))
         step = path.length / steps
     elif steps < 1:
         raise PathError(f"a walk needs at least 1 step, not {steps}")

@@ -29,7 +29,7 @@ def reachable_height(
     `hips` (n, 3), `hips_rotation` (n, 4), `ankles` per side (n, 3), all in the world. Raises ReachError, which
     names the first instant (`place`, e.g. phases), when the pelvis would sink too far.
     """
-    height = hips[:, 1]
+    limits = []
     longest = REACH * body.leg
     for side in SIDES:
         hip_joint = rot.rotate(hips_rotation, body.offsets[INDEX[f"{side}UpperLeg"]])
@@ -45,8 +45,9 @@ def reachable_height(
                 f"the {side} foot is out of the leg's reach{where}: {np.hypot(level[at], away[at, 1]):.3f} m from the"
                 f" hip, and the leg is {body.leg:.3f} m long"
             )
-        height = soft_minimum(height, limit, _SOFT_M * body.scale)
-    return height
+        limits.append(limit)
+    width = _SOFT_M * body.scale
+    return soft_minimum(hips[:, 1], soft_minimum(limits[0], limits[1], width), width)
 
 
 def close_leg(

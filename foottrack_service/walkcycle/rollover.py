@@ -147,7 +147,7 @@ def foot_curves(body: Humanoid, timing: ContactTiming, keys: FootKeys, stride: f
     height = travel(grid)[:, 1] + rolled_ankle(body, rolling_pitch(grid), share(_GRID))[:, 0]
     toes = toes_above_floor(body, height, rolling_pitch(grid), toes_pitch(grid))
     depth = -lowest_point(body, height, rolling_pitch(grid), toes) - _PENETRATION_M
-    bump = (4.0 * _GRID * (1.0 - _GRID)) ** 3
+    bump = _raising(_GRID)
     lift = float(np.max(np.where(depth > 0.0, depth / np.maximum(bump, 1e-9), 0.0)))
     if lift > body.shank / 3.0:
         worst = float(grid[np.argmax(depth)])
@@ -158,7 +158,12 @@ def foot_curves(body: Humanoid, timing: ContactTiming, keys: FootKeys, stride: f
     def lifted(phase: Array) -> Array:
         u = np.clip((phase - timing.toe_off) / (1.0 - timing.toe_off), 0.0, 1.0)
         raised = travel(phase)
-        raised[..., 1] += lift * (4.0 * u * (1.0 - u)) ** 3
+        raised[..., 1] += lift * _raising(u)
         return raised
 
     return FootCurves(timing, strikes_on_ball, rolling_pitch, toes_pitch, lifted, yaw_curve)
+
+
+def _raising(swing: Array) -> Array:
+    """How much of a lift a swing has, 0 to 1: all of it but for its beginning and end."""
+    return smooth_step(swing / 0.2) * smooth_step((1.0 - swing) / 0.2)

@@ -10,7 +10,7 @@ from foottrack_service.walkcycle.skeleton import POSED_JOINTS, Humanoid
 
 Array = npt.NDArray[np.float64]
 
-_SOFT_KNEES_M = 0.006
+_SOFT_KNEES_M = 0.001
 _ARM_DOWN = np.radians(77.0)
 _ELBOW = np.radians(10.0)
 
