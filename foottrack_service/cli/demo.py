@@ -154,7 +154,7 @@ async def _demo(
             now = service.bus.clock()
             watched.seconds = (now - began) * 1e-9
             watched.streams = {
-                topic: {"hz": round(row["messages"] / watched.seconds, 1), "gaps": row["gaps"]}
+                topic: {"hz": round(row.messages / watched.seconds, 1), "gaps": row.gaps}
                 for topic, row in rates.rows(now).items()
             }
             play.cancel()
@@ -163,7 +163,7 @@ async def _demo(
 
 async def _watch(
     subscriber: Any,
-    play: asyncio.Future[None],
+    play: asyncio.Future[Any],
     rates: StreamRates,
     watched: Watched,
     shown: Live | None,

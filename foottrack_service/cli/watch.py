@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import json
 import time
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 from rich.live import Live
@@ -27,6 +27,17 @@ from foottrack_service.config import Settings
 _REDRAW_S = 0.5
 
 
+class Row(NamedTuple):
+    """One stream."""
+
+    hz: float
+    messages: int
+    gaps: int
+    age_s: float
+    latency_ms: float
+    """From hand-over to arrival, median of the last second."""
+
+
 class StreamRates:
     """Rates and latencies per topic over a sliding second, from what a subscriber received."""
 
@@ -44,22 +55,22 @@ class StreamRates:
             self._seen[topic] = self._seen.get(topic, 0) + 1
             self._first.setdefault(topic, received.arrival)
 
-    def rows(self, now: int) -> dict[str, dict[str, float | int | None]]:
-        """Per topic: ``hz``, ``messages``, ``gaps``, ``age_s``, ``latency_ms`` (hand-over to arrival, median)."""
-        rows: dict[str, dict[str, float | int | None]] = {}
+    def rows(self, now: int) -> dict[str, Row]:
+        """Per topic, sorted by name."""
+        rows: dict[str, Row] = {}
         for topic in sorted(self._recent):
             newest = self._recent[topic][-1][0]
             span = min(1_000_000_000, max(1, now - self._first[topic]))
             recent = [entry for entry in self._recent[topic] if now - entry[0] <= span]
             self._recent[topic] = recent or self._recent[topic][-1:]
             delays = sorted(delay for _, delay in self._recent[topic])
-            rows[topic] = {
-                "hz": round(len(recent) / (span * 1e-9), 1),
-                "messages": self._seen[topic],
-                "gaps": self._subscriber.stats.topics[topic].gaps,
-                "age_s": round((now - newest) * 1e-9, 3),
-                "latency_ms": round(delays[len(delays) // 2] * 1e-6, 3),
-            }
+            rows[topic] = Row(
+                hz=round(len(recent) / (span * 1e-9), 1),
+                messages=self._seen[topic],
+                gaps=self._subscriber.stats.topics[topic].gaps,
+                age_s=round((now - newest) * 1e-9, 3),
+                latency_ms=round(delays[len(delays) // 2] * 1e-6, 3),
+            )
         return rows
 
 
@@ -94,15 +105,14 @@ def echo(
         run_loop(_echo(settings, topic, count, as_json))
 
 
-def rates_table(rows: dict[str, dict[str, float | int | None]]) -> Table:
+def rates_table(rows: dict[str, Row]) -> Table:
     """The table of ``StreamRates.rows``."""
     table = Table(title="foottrack", title_justify="left")
-    table.add_column("topic")
+    table.add_column("topic", no_wrap=True)
     for name in ("Hz", "messages", "gaps", "age s", "latency ms"):
         table.add_column(name, justify="right")
     for topic, row in rows.items():
-        style = "red" if row["gaps"] else None
-        table.add_row(topic, *(str(value) for value in row.values()), style=style)
+        table.add_row(topic, *map(str, row), style="red" if row.gaps else None)
     if not rows:
         table.add_row("nothing yet", "", "", "", "", "")
     return table
@@ -118,7 +128,7 @@ async def _top(settings: Settings, seconds: float | None, as_json: bool) -> None
         end = None if seconds is None else time.monotonic() + seconds
         if as_json:
             await _collect(subscriber, rates, None, end)
-            print_json({"streams": rates.rows(bus.clock())})
+            print_json({"streams": {topic: row._asdict() for topic, row in rates.rows(bus.clock()).items()}})
             return
         with Live(rates_table({}), refresh_per_second=4) as live:
             while end is None or time.monotonic() < end:
