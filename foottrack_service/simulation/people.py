@@ -28,7 +28,7 @@ from foottrack_service.simulation.truth import FootTrack, Truth, grid
 def head_moving(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
     """Feet still, the head turns, nods, tilts and shifts."""
     bearing = Bearing(gaze_sd=math.radians(8.0), gaze_band_hz=0.6, sway_sd=0.03, sway_band_hz=0.5)
-    return _scene(seconds, settings, feet, random, Planner(random), bearing)
+    return scene(seconds, settings, feet, random, Planner(random), bearing)
 
 
 def steps(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
@@ -49,7 +49,7 @@ def line(seconds: float, settings: Settings, feet: Feet, random: np.random.Gener
         plan.stand(0.6)
         plan.turn(math.pi, CAUTIOUS, 0.8)
         plan.stand(0.8)
-    return _scene(seconds, settings, feet, random, plan, Bearing())
+    return scene(seconds, settings, feet, random, plan, Bearing())
 
 
 def circle(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
@@ -61,7 +61,7 @@ def circle(seconds: float, settings: Settings, feet: Feet, random: np.random.Gen
         plan.arc(1.0, direction * angle, 0.45, CAUTIOUS, 0.8)
         plan.stand(1.0)
         direction = -direction
-    return _scene(seconds, settings, feet, random, plan, Bearing())
+    return scene(seconds, settings, feet, random, plan, Bearing())
 
 
 def knee_bends(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
@@ -76,7 +76,7 @@ def knee_bends(seconds: float, settings: Settings, feet: Feet, random: np.random
     out = math.radians(10.0)
     plan = Planner(random, feet={"left": Place(-0.16, 0.0, out), "right": Place(0.16, 0.0, -out)})
     squat = Extra(crouch=crouch, back=0.9 * crouch, lean=1.3 * crouch)
-    return _scene(seconds, settings, feet, random, plan, Bearing(), squat)
+    return scene(seconds, settings, feet, random, plan, Bearing(), squat)
 
 
 def upper_body(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
@@ -89,7 +89,7 @@ def upper_body(seconds: float, settings: Settings, feet: Feet, random: np.random
         yaw += direction * math.radians(random.uniform(35.0, 60.0)) * bump
         lean += random.uniform(0.03, 0.1) * bump
         start, direction = start + 3.0 + random.uniform(0.1, 0.5), -direction
-    return _scene(seconds, settings, feet, random, Planner(random), Bearing(), Extra(lean=lean, yaw=yaw))
+    return scene(seconds, settings, feet, random, Planner(random), Bearing(), Extra(lean=lean, yaw=yaw))
 
 
 def walk_in_place(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
@@ -105,7 +105,7 @@ def walk_in_place(seconds: float, settings: Settings, feet: Feet, random: np.ran
             plan.step(side, home, IN_PLACE, interval)
             side = "right" if side == "left" else "left"
         plan.stand(random.uniform(1.5, 2.5))
-    return _scene(seconds, settings, feet, random, plan, Bearing())
+    return scene(seconds, settings, feet, random, plan, Bearing())
 
 
 def walk(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
@@ -118,7 +118,29 @@ def walk(seconds: float, settings: Settings, feet: Feet, random: np.random.Gener
         if plan.now < seconds - 6.0:
             plan.turn(math.pi, CAUTIOUS, 0.8)
             plan.stand(0.8)
-    return _scene(seconds, settings, feet, random, plan, Bearing())
+    return scene(seconds, settings, feet, random, plan, Bearing())
+
+
+def scene(
+    seconds: float,
+    settings: Settings,
+    feet: Feet,
+    random: np.random.Generator,
+    plan: Planner,
+    bearing: Bearing,
+    extra: Extra = Extra(),  # noqa: B008 - frozen
+) -> Truth:
+    """What comes of a plan of steps: both feet, and the head and hips that they carry."""
+    t = grid(seconds)
+    samples = {
+        side: stepping(t, plan.start[side], plan.steps[side], sole(settings.feet.of(side))) for side in plan.start
+    }
+    wearer = person(settings.body, settings.feet.left.ankle_height)
+    head, hips = carried(samples["left"], samples["right"], wearer, bearing, extra, random)
+    tracks: dict[Side, FootTrack] = {
+        side: footwear.track(foot, sole(settings.feet.of(side)), feet, random) for side, foot in samples.items()
+    }
+    return Truth(seconds, head, tracks, hips)
 
 
 def _pairs(
@@ -136,25 +158,4 @@ def _pairs(
         plan.step(second, target[second], CAUTIOUS, 0.8)
         plan.stand(random.uniform(0.5, 1.0))
         index += 1
-    return _scene(seconds, settings, feet, random, plan, Bearing())
-
-
-def _scene(
-    seconds: float,
-    settings: Settings,
-    feet: Feet,
-    random: np.random.Generator,
-    plan: Planner,
-    bearing: Bearing,
-    extra: Extra = Extra(),  # noqa: B008 - frozen
-) -> Truth:
-    t = grid(seconds)
-    samples = {
-        side: stepping(t, plan.start[side], plan.steps[side], sole(settings.feet.of(side))) for side in plan.start
-    }
-    wearer = person(settings.body, settings.feet.left.ankle_height)
-    head, hips = carried(samples["left"], samples["right"], wearer, bearing, extra, random)
-    tracks: dict[Side, FootTrack] = {
-        side: footwear.track(foot, sole(settings.feet.of(side)), feet, random) for side, foot in samples.items()
-    }
-    return Truth(seconds, head, tracks, hips)
+    return scene(seconds, settings, feet, random, plan, Bearing())

@@ -22,7 +22,7 @@ from foottrack_service.simulation.emission import (
 from foottrack_service.simulation.faults import Fault
 from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.imu import measured as measured_by_imu
-from foottrack_service.simulation.tasks import TASKS
+from foottrack_service.simulation.tasks import TASKS, Maker
 from foottrack_service.simulation.truth import BOTH, Truth
 
 _HOP_NS = 150_000
@@ -88,22 +88,26 @@ def simulate(
     depth: bool = True,
     faults: Sequence[Fault] = (),
     start: int = 0,
+    motion: Maker | None = None,
 ) -> Scenario:
-    """Simulate a task. Raises ValueError for an unknown task, a rate or a length that cannot be.
+    """Simulate a task, or a ``motion`` of one's own under the task's name.
+
+    Raises ValueError for an unknown task, a rate or a length that cannot be.
 
     Every sensor draws from a stream of its own, so leaving one out, or a fault in one, changes no other's noise.
     """
-    if task not in TASKS:
+    if motion is None and task not in TASKS:
         raise ValueError(f"no task is called {task!r}; there are {', '.join(TASKS)}")
-    length = TASKS[task].seconds if seconds is None else seconds
+    length = seconds if seconds is not None else TASKS[task].seconds if motion is None else 30.0
     if not 1.0 <= length <= 3600.0:
         raise ValueError(f"a scenario lasts 1 to 3600 s, not {length:g}")
     if not 20.0 <= imu_hz <= 1600.0:
         raise ValueError(f"an IMU samples at 20 to 1600 Hz, not {imu_hz:g}")
     settings = settings or Settings()
     seeds = np.random.SeedSequence([seed, *task.encode()])
-    motion, *imus, head, pictures, disturbed = seeds.spawn(6)
-    truth = TASKS[task].truth(length, settings, feet, np.random.default_rng(motion))
+    moving, *imus, head, pictures, disturbed = seeds.spawn(6)
+    maker = TASKS[task].truth if motion is None else motion
+    truth = maker(length, settings, feet, np.random.default_rng(moving))
     drawn = list(zip(faults, map(np.random.default_rng, disturbed.spawn(len(faults))), strict=True))
 
     emissions = []
