@@ -16,6 +16,9 @@ from foottrack_service.walkcycle.walk import Contact, Motion, Walk
 
 Array = npt.NDArray[np.float64]
 
+_END_S = 1e-6
+"""So close to its ends, where the phase stands still, a walk has no instants of its own."""
+
 
 @dataclass(frozen=True)
 class Frames:
@@ -70,4 +73,4 @@ def contact_edges(walk: Walk, *, flat: bool = False) -> Array:
                 edges.update(interval if flat else ())
         ends = [interval for interval in (contact.heel, contact.ball) if interval is not None]
         edges.update((min(i[0] for i in ends), max(i[1] for i in ends)))
-    return np.array(sorted(edge for edge in edges if 0.0 < edge < walk.duration))
+    return np.array(sorted(edge for edge in edges if _END_S < edge < walk.duration - _END_S))

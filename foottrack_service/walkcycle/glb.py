@@ -103,10 +103,10 @@ def parse_glb(data: bytes) -> Motion:
     """The first animation of a GLB whose nodes carry our joints' names. Raises MotionFileError."""
     try:
         file = gltf.GLTF2.load_from_bytes(data)
-        blob = file.binary_blob()
+        blob = file.binary_blob() if file is not None else None
     except (ValueError, KeyError, TypeError, OSError, struct.error) as error:
         raise MotionFileError(f"GLB: {error or type(error).__name__}") from None
-    if file is None or blob is None or not file.animations:
+    if blob is None or not file.animations:
         raise MotionFileError("GLB: no binary chunk with an animation")
     nodes = {node.name: i for i, node in enumerate(file.nodes)}
     missing = [name for name in JOINTS if name not in nodes]
