@@ -18,12 +18,13 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 def compiled(function: F) -> F:
     """The function, compiled at its first call. IEEE rules are kept: the same input gives the same bits."""
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = before or _CACHE
+    config: Any = numba.config
+    before = config.CACHE_DIR
+    config.CACHE_DIR = before or _CACHE
     try:
         return cast(F, numba.njit(cache=True, error_model="numpy")(function))
     finally:
-        numba.config.CACHE_DIR = before
+        config.CACHE_DIR = before
 
 
 def _cache_folder() -> str:

@@ -10,11 +10,12 @@ standing, walking, soft soles and running.
 from __future__ import annotations
 
 import math
+from collections import deque
 
 import numpy as np
 
 from foottrack_service.fusion.compiled import compiled
-from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE
+from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE, Stamps
 from foottrack_service.fusion.foot_filter_kernel import GRAVITY, rotation, turned
 from foottrack_service.rotations import Array
 
@@ -39,12 +40,17 @@ PUSH, PUSH_SHARE = 0.5, 0.3
 DOUBT_S = 1.0
 """A push that lasts for longer, in silence, is no push but a wrong tilt."""
 
+SEEN_SPAN_NS = 250_000_000
+SEEN_LEAST = 6
+SEEN_NOISE = 0.04
+"""m/s: fixes of a standing foot may drift apart by so much through errors of the camera's mount."""
+
 # memory, shape (3,): the swing's peak that fades, the newest sample's statistic, how long it was pushed
 PEAK, STATISTIC, DOUBTED = 0, 1, 2
 
 
 @compiled
-def stillness(t: Array, rows: Array, i: int, mean: Array) -> float:
+def stillness(t: Stamps, rows: Array, i: int, mean: Array) -> float:
     """The statistic over the window that ends at the IMU row i (0: as still as can be); inf before there is one.
 
     Writes the mean specific force, m/s^2, into ``mean``, shape (3,).
@@ -84,7 +90,7 @@ def stillness(t: Array, rows: Array, i: int, mean: Array) -> float:
 
 
 @compiled
-def stance_sigma(t: Array, rows: Array, i: int, dt: float, x: Array, P: Array, memory: Array) -> float:
+def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, memory: Array) -> float:
     """How well the foot's velocity is known to be zero at the IMU row i, m/s per 10 ms; 0.0 when it swings.
 
     ``dt``, s, since the last sample; ``x`` and ``P`` the filter before it; ``memory``, shape (3,), is carried from
@@ -111,3 +117,33 @@ def stance_sigma(t: Array, rows: Array, i: int, dt: float, x: Array, P: Array, m
         if memory[DOUBTED] < DOUBT_S:
             return 0.0
     return STILL_SIGMA + SIGMA_GROWTH * statistic
+
+
+class SeenMotion:
+    """Whether accepted fixes of the last quarter of a second move: then the foot does not stand, however quiet it is.
+
+    Slow knee bends and a tracker in a hand are quiet, and no stance.
+    """
+
+    def __init__(self) -> None:
+        self.speed = 0.0
+        """m/s; 0.0 while the fixes show none."""
+        self._seen: deque[tuple[int, Array]] = deque(maxlen=64)
+
+    def clear(self) -> None:
+        """Begin again."""
+        self.speed = 0.0
+        self._seen.clear()
+
+    def see(self, t: int, point: Array) -> None:
+        """An accepted fix at ``t``, ns, shape (3,), m, stage."""
+        seen = self._seen
+        seen.append((t, point))
+        while t - seen[0][0] > SEEN_SPAN_NS:
+            seen.popleft()
+        self.speed = 0.0
+        if len(seen) >= SEEN_LEAST and t - seen[0][0] > SEEN_SPAN_NS // 2:
+            times = np.array([(s[0] - t) * 1e-9 for s in seen])
+            times -= times.mean()
+            speed = float(np.linalg.norm(times @ np.array([s[1] for s in seen]) / (times @ times)))
+            self.speed = speed if speed > SEEN_NOISE else 0.0

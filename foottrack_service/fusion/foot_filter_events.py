@@ -6,6 +6,11 @@ kind are named here; every row has all of them.
 
 from __future__ import annotations
 
+import numpy as np
+import numpy.typing as npt
+
+Stamps = npt.NDArray[np.int64]
+
 COLUMNS = 26
 
 KIND = 0

@@ -7,25 +7,23 @@ other but not with us start the place anew (foot_filter_optical). The output is 
 from __future__ import annotations
 
 import math
-from collections import deque
 
 import numpy as np
 
 from foottrack_protocol.messages import Side
 from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings, Placement
-from foottrack_service.fusion.contact import STATISTIC, stance_sigma
+from foottrack_service.fusion.contact import STATISTIC, SeenMotion, stance_sigma
+from foottrack_service.fusion.foot_filter_candidates import Candidates, Rejected
 from foottrack_service.fusion.foot_filter_events import (
-    ACC,
     ACCEPTED,
     ARM,
-    CLIPPED,
+    COLUMNS,
     FIX,
     FLOOR,
     GYRO,
     IMU,
     KIND,
-    MEAN_RATE,
     MEASURED_Q,
     POINT,
     POINT_COV,
@@ -35,19 +33,16 @@ from foottrack_service.fusion.foot_filter_events import (
     SPEED,
     SPEED_SIGMA,
     TURN_SIGMA,
-    UP,
     YAW_SIGMA,
     ZERO_SIGMA,
 )
-from foottrack_service.fusion.foot_filter_kernel import NE, NX
+from foottrack_service.fusion.foot_filter_kernel import NE
 from foottrack_service.fusion.foot_filter_optical import (
     CHI_SQUARE_1,
     CHI_SQUARE_3,
     OLDEST_S,
     Blob,
-    Candidates,
     FixRows,
-    Rejected,
     implausible,
     judged,
 )
@@ -60,16 +55,13 @@ from foottrack_service.fusion.foot_filter_replay import (
     replay,
     smallest_variances,
 )
+from foottrack_service.fusion.foot_filter_sample import SampleRows, first_state, upright, usable
 from foottrack_service.fusion.interface import FIX_MEMORY_S, ImuSample, Kind, OpticalFix, Verdict
 from foottrack_service.fusion.timeline import Timeline
 from foottrack_service.rotations import Array
 
 FEET_APART = {"left": -0.1, "right": 0.1}
 """m: where a foot stands that only an IMU knows (PROTOCOL, results)."""
-MOST_RATE = 40.0
-"""rad/s: increments of a device's q that are faster are its own corrections, not the foot."""
-FULL_SCALES = (39.2266, 78.4532, 156.9064)
-"""m/s^2 at which accelerometers end: 4, 8, 16 g."""
 QUIET_STATISTIC = 0.25
 """A foot this quiet shows its gyro's bias."""
 JUMPED_AFTER = 4
@@ -80,9 +72,6 @@ UNSURE_SIGMA = 0.3
 """m per axis: likewise."""
 SURE_AGE_S = 0.9
 SURE_SIGMA = 0.03
-SLOPE_SPAN_NS = 250_000_000
-SLOPE_NOISE = 0.04
-"""m/s: fixes of a standing foot may drift apart by so much through errors of the camera's mount."""
 
 
 class InertialFilter:
@@ -91,12 +80,20 @@ class InertialFilter:
     def __init__(self, foot: FootSettings, side: Side, *, floor: bool) -> None:
         self._foot, self._side, self._use_floor = foot, side, floor
         self._floor = 0.0
-        self._timeline = Timeline()
-        self._smallest = smallest_variances()
+        self._timeline, self._smallest = Timeline(), smallest_variances()
+        self._samples = SampleRows()
+        self._last: Array = np.zeros(COLUMNS)
+        self._imu_t, self._behind = 0, 0
+        self._memory, self._lock = np.zeros(3), np.zeros(9)
         self._imu_yaw: float | None = None
+        self._seen_yaw = False
         self._blob = Blob(foot)
+        self._candidates: dict[Kind, Candidates] = {"marker": Candidates(), "depth": Candidates()}
+        self._fix_t: dict[Kind, int] = {}
+        self._motion = SeenMotion()
+        self.acquired = False
+        """Whether fixes have said where the foot is, and not too long ago."""
         self.place(foot.imu)
-        self._forget()
 
     def place(self, imu: Placement) -> None:
         """The sensor's place on the shoe."""
@@ -107,19 +104,19 @@ class InertialFilter:
         self._geometry[FOOT_UP : FOOT_UP + 3] = rot.unrotate(self._imu_q, np.array([0.0, 1.0, 0.0]))
         self._toe_arm = rot.unrotate(self._imu_q, np.array(foot.toe.p) - p)
         self._fix_rows = FixRows(foot, p, self._imu_q, self._blob)
+        self.acquired = False
 
     def set_floor(self, height: float) -> None:
         """Floor height in the stage, m."""
         self._floor = height
 
     def set_imu_yaw(self, yaw: float) -> None:
-        """Yaw of the device's own frame in the stage, rad: used when the filter begins."""
+        """Yaw of the device's own frame in the stage, rad: counts until a tag shows the foot's."""
         self._imu_yaw = yaw
 
     def on_imu(self, sample: ImuSample) -> None:
         """Take a sample. Without rate or attitude, or not finite, or from the past, it is left out."""
-        given = [*sample.acc, *([] if sample.gyro is None else sample.gyro), *([] if sample.q is None else sample.q)]
-        if not all(map(math.isfinite, given)) or (sample.gyro is None and sample.q is None):
+        if not usable(sample):
             return
         timeline = self._timeline
         if timeline.n == 0:
@@ -134,17 +131,18 @@ class InertialFilter:
         dt = (sample.t - self._imu_t) * 1e-9
         if dt > UNSURE_AFTER_S:
             self.acquired = False
-        t = max(sample.t, int(timeline.t[timeline.n - 1]))
-        i = timeline.append(t)
-        self._fill(timeline.rows[i], sample, dt)
+        i = timeline.place(sample.t)
+        if i == 0:
+            return
         row = timeline.rows[i]
+        self._samples.fill(row, sample, dt)
         sigma = stance_sigma(timeline.t, timeline.rows, i, dt, timeline.X[i - 1], timeline.P[i - 1], self._memory)
         if sigma > 0.0:
-            row[ZERO_SIGMA] = math.hypot(sigma, self._drift)
-            row[QUIET_FLAG] = float(self._memory[STATISTIC] < QUIET_STATISTIC and self._drift == 0.0)
+            row[ZERO_SIGMA] = math.hypot(sigma, self._motion.speed)
+            row[QUIET_FLAG] = float(self._memory[STATISTIC] < QUIET_STATISTIC and self._motion.speed == 0.0)
         row[FLOOR] = self._floor + self._foot.ankle_height if self._use_floor else math.nan
         self._replay(i)
-        follow(self._lock, row, timeline.X[i], self._toe_arm, min(dt, HOLE_S))
+        follow(self._lock, row, timeline.X[timeline.n - 1], self._toe_arm, min(dt, HOLE_S))
         self._imu_t, self._last = sample.t, row.copy()
 
     def on_fix(self, fix: OpticalFix) -> Verdict:
@@ -159,7 +157,7 @@ class InertialFilter:
             return Verdict.STALE
         delay = float(np.clip(timeline.X[timeline.n - 1, 16], -0.05, 0.05))
         t = fix.t + round(delay * 1e9)
-        i = timeline.append(t) if t >= timeline.t[timeline.n - 1] else timeline.insert(t)
+        i = timeline.place(t)
         if i == 0:
             return Verdict.STALE
         row = timeline.rows[i]
@@ -169,6 +167,8 @@ class InertialFilter:
         x, P = timeline.X[i], timeline.P[i]
         ours = self._fix_rows.take_attitude(row, fix, attitudes, x)
         found = judged(row, x, P, self._rate(i))
+        if math.sqrt(max(P[0, 0], P[1, 1], P[2, 2])) > UNSURE_SIGMA:
+            self.acquired = False
         good = ours and found[0] <= CHI_SQUARE_3 and found[1] <= CHI_SQUARE_1
         if self.acquired and good:
             self._accept(i, t, fix.kind)
@@ -213,14 +213,14 @@ class InertialFilter:
         # Fixes of the old stage are in the checkpoints already; none of them may be replayed.
         timeline.restart(int(timeline.t[n - 1]))
         self._clear_candidates()
-        self._seen.clear()
+        self._motion.clear()
         self._lock[:] = 0.0
 
     def lose(self) -> None:
         """The stage moved and nobody knows how: the place needs fixes that agree."""
-        self.acquired = False
+        self.acquired, self._seen_yaw = False, False
         self._clear_candidates()
-        self._seen.clear()
+        self._motion.clear()
         if self._timeline.n:
             last = self._timeline.restart(int(self._timeline.t[self._timeline.n - 1]))
             self._timeline.P[last, range(3), range(3)] += 1.0
@@ -256,66 +256,21 @@ class InertialFilter:
         q = rot.multiply(out[3:7], rot.conjugate(self._imu_q))
         return out[0:3], q, out[7:10], math.sqrt(out[10] / 3.0)
 
-    def _forget(self) -> None:
-        self._timeline.n = 0
-        self._imu_t, self._behind = 0, 0
-        self._memory, self._lock = np.zeros(3), np.zeros(9)
-        self._last: Array = np.zeros(1)
-        self._q: Array | None = None
-        self.acquired, self._seen_yaw = False, False
-        self._candidates: dict[Kind, Candidates] = {"marker": Candidates(), "depth": Candidates()}
-        self._fix_t: dict[Kind, int] = {}
-        self._seen: deque[tuple[int, Array]] = deque(maxlen=64)
-        self._drift = 0.0
-
     def _begin(self, sample: ImuSample) -> None:
-        norm = float(np.linalg.norm(sample.acc))
-        if norm < 1.0:
+        q = upright(sample)
+        if q is None:
             return
-        if sample.q is not None and np.any(sample.q != 0.0):
-            q = rot.normalised(sample.q)
-        else:
-            up = sample.acc / norm
-            axis = np.cross(up, [0.0, 1.0, 0.0])
-            sine = float(np.linalg.norm(axis))
-            q = rot.from_rotation_vector(axis / max(sine, 1e-12) * math.atan2(sine, up[1]))
         if self._imu_yaw is not None and sample.q is not None:
             q = rot.multiply(rot.from_yaw(self._imu_yaw), q)
         else:
             q = rot.multiply(rot.from_yaw(-rot.yaw_of(rot.multiply(q, rot.conjugate(self._imu_q)))), q)
         timeline = self._timeline
         i = timeline.append(sample.t)
-        self._fill(timeline.rows[i], sample, 0.0)
+        self._samples.fill(timeline.rows[i], sample, 0.0)
         ankle = np.array([FEET_APART[self._side], self._floor + self._foot.ankle_height, 0.0])
-        x, P = np.zeros(NX), np.zeros((NE, NE))
-        x[0:3] = ankle - rot.rotate(q, self._geometry[ANKLE_ARM : ANKLE_ARM + 3])
-        x[6:10] = q
-        tilt = 0.03 if sample.gyro is None else 0.05
-        sigmas = [0.03] * 3 + [0.1] * 3 + [tilt, 0.02, tilt] + [0.05] * 3
-        sigmas += [1e-7 if sample.gyro is None else 0.01] * 3 + [0.005]
-        P[np.arange(NE), np.arange(NE)] = np.square(sigmas)
+        x, P = first_state(q, ankle - rot.rotate(q, self._geometry[ANKLE_ARM : ANKLE_ARM + 3]), sample)
         timeline.X[i], timeline.P[i] = x, P
         self._imu_t, self._last = sample.t, timeline.rows[i].copy()
-
-    def _fill(self, row: Array, sample: ImuSample, dt: float) -> None:
-        row[KIND] = IMU
-        row[ACC : ACC + 3] = sample.acc
-        largest = float(np.max(np.abs(sample.acc)))
-        row[CLIPPED] = float(any(0.985 < largest / scale < 1.02 for scale in FULL_SCALES))
-        q = None
-        if sample.q is not None and np.any(sample.q != 0.0):
-            q = rot.normalised(sample.q)
-            row[UP : UP + 3] = rot.unrotate(q, np.array([0.0, 1.0, 0.0]))
-        if sample.gyro is not None:
-            row[GYRO : GYRO + 3] = sample.gyro
-        else:
-            row[MEAN_RATE] = 1.0
-            if q is not None and self._q is not None and dt > 0.0:
-                rate = rot.to_rotation_vector(rot.multiply(rot.conjugate(self._q), q)) / dt
-                if float(rate @ rate) < MOST_RATE**2:
-                    row[GYRO : GYRO + 3] = rate
-        if q is not None:
-            self._q = q
 
     def _replay(self, start: int) -> None:
         timeline = self._timeline
@@ -323,9 +278,10 @@ class InertialFilter:
 
     def _rate(self, i: int) -> Array:
         rows = self._timeline.rows
-        j = i + 1 if i + 1 < self._timeline.n and rows[i + 1, KIND] == IMU else i - 1
-        x = self._timeline.X[i]
-        return rows[j, GYRO : GYRO + 3] - x[13:16] if rows[j, KIND] == IMU else self._last[GYRO : GYRO + 3] - x[13:16]
+        j = i + 1 if i + 1 < self._timeline.n else i - 1
+        near = rows[j] if rows[j, KIND] == IMU else self._last
+        rate: Array = near[GYRO : GYRO + 3] - self._timeline.X[i, 13:16]
+        return rate
 
     def _clear_candidates(self) -> None:
         for candidates in self._candidates.values():
@@ -339,28 +295,11 @@ class InertialFilter:
         self._candidates["depth"].clear()
         if kind == "marker":
             self._candidates["marker"].clear()
-        self._see(t, row[POINT : POINT + 3].copy())
-        if self._drift > 0.0:
-            for j in range(i + 1, timeline.n):
-                if timeline.rows[j, ZERO_SIGMA] > 0.0:
-                    timeline.rows[j, ZERO_SIGMA] = max(timeline.rows[j, ZERO_SIGMA], self._drift)
+        self._motion.see(t, row[POINT : POINT + 3].copy())
+        if self._motion.speed > 0.0:
+            sigmas = timeline.rows[i + 1 : timeline.n, ZERO_SIGMA]
+            sigmas[sigmas > 0.0] = np.maximum(sigmas[sigmas > 0.0], self._motion.speed)
         self._replay(i)
-
-    def _see(self, t: int, point: Array) -> None:
-        """Whether accepted fixes of the last quarter of a second move: then the foot does not stand, however quiet."""
-        seen = self._seen
-        seen.append((t, point))
-        while seen and t - seen[0][0] > SLOPE_SPAN_NS:
-            seen.popleft()
-        self._drift = 0.0
-        if len(seen) >= 6 and t - seen[0][0] > 0.5 * SLOPE_SPAN_NS:
-            times = np.array([(s[0] - t) * 1e-9 for s in seen])
-            times -= times.mean()
-            points = np.array([s[1] for s in seen])
-            slope = times @ (points - points.mean(axis=0)) / (times @ times)
-            speed = float(np.linalg.norm(slope))
-            if speed > SLOPE_NOISE:
-                self._drift = speed
 
     def _sure_for(self, P: Array, t: int, kind: Kind) -> float | None:
         """Seconds since the last accepted fix, of a foot that knows its place so well that others must insist.
@@ -407,8 +346,7 @@ class InertialFilter:
         self._replay(i)
         self.acquired = True
         self._fix_t[fix.kind] = last.t
-        self._seen.clear()
-        self._drift = 0.0
+        self._motion.clear()
         self._lock[:] = 0.0
 
     def _jump_to(self, t: int) -> None:
@@ -420,5 +358,5 @@ class InertialFilter:
         self._memory[:] = 0.0
         self.acquired = False
         self._clear_candidates()
-        self._seen.clear()
-        self._q = None
+        self._motion.clear()
+        self._samples.forget()

@@ -220,11 +220,11 @@ def update3(x: Array, P: Array, H: Array, innovation: Array, S_noise: Array, gat
                 S[m, n] += H[m, i] * PH[i, n]
     inverse = np.empty((3, 3))
     if not invert3(S, inverse):
-        return np.inf
+        return math.inf
     y = inverse @ innovation
-    distance = innovation[0] * y[0] + innovation[1] * y[1] + innovation[2] * y[2]
+    distance = float(innovation[0] * y[0] + innovation[1] * y[1] + innovation[2] * y[2])
     if not distance <= gate:
-        return distance if distance == distance else np.inf
+        return distance if distance == distance else math.inf
     d = PH @ y
     K = PH @ inverse
     for i in range(NE):
@@ -248,10 +248,10 @@ def update1(x: Array, P: Array, h: Array, innovation: float, noise: float, gate:
     for i in range(NE):
         S += h[i] * ph[i]
     if not S > 0.0:
-        return np.inf
+        return math.inf
     distance = innovation * innovation / S
     if not distance <= gate:
-        return distance if distance == distance else np.inf
+        return distance if distance == distance else math.inf
     for i in range(NE):
         for j in range(i, NE):
             P[i, j] -= ph[i] * ph[j] / S

@@ -35,6 +35,7 @@ from foottrack_service.fusion.foot_filter_events import (
     UP,
     YAW_SIGMA,
     ZERO_SIGMA,
+    Stamps,
 )
 from foottrack_service.fusion.foot_filter_kernel import (
     GRAVITY,
@@ -86,7 +87,7 @@ def smallest_variances() -> Array:
 
 
 @compiled
-def replay(t: Array, rows: Array, X: Array, P: Array, start: int, end: int, geometry: Array, smallest: Array) -> None:
+def replay(t: Stamps, rows: Array, X: Array, P: Array, start: int, end: int, geometry: Array, smallest: Array) -> None:
     """States and covariances after the events ``start`` .. ``end`` - 1 from the one before. ``start`` is at least 1."""
     for i in range(start, end):
         X[i] = X[i - 1]
@@ -188,7 +189,7 @@ def _rate(rows: Array, x: Array, i: int, end: int) -> Array:
 
 
 @compiled
-def _advance(t: Array, rows: Array, x: Array, P: Array, i: int, end: int, dt: float) -> None:
+def _advance(t: Stamps, rows: Array, x: Array, P: Array, i: int, end: int, dt: float) -> None:
     """Carry the state over the dt before event i."""
     before = _neighbour(rows, i, -1, end)
     after = i if rows[i, KIND] == IMU else _neighbour(rows, i, 1, end)

@@ -15,7 +15,8 @@ import numpy as np
 
 from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings
-from foottrack_service.fusion.foot_filter_optical import CHI_SQUARE_3, Candidates, Rejected, implausible
+from foottrack_service.fusion.foot_filter_candidates import Candidates, Rejected
+from foottrack_service.fusion.foot_filter_optical import CHI_SQUARE_3, implausible
 from foottrack_service.fusion.interface import OpticalFix, Verdict
 from foottrack_service.rotations import Array
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foottrack_service.fusion.foot_filter_events import COLUMNS
+from foottrack_service.fusion.foot_filter_events import COLUMNS, Stamps
 from foottrack_service.fusion.foot_filter_kernel import NE, NX
 from foottrack_service.rotations import Array
 
@@ -22,10 +22,14 @@ class Timeline:
 
     def __init__(self) -> None:
         self.n = 0
-        self.t = np.zeros(2 * KEPT, dtype=np.int64)
+        self.t: Stamps = np.zeros(2 * KEPT, dtype=np.int64)
         self.rows: Array = np.zeros((2 * KEPT, COLUMNS))
         self.X: Array = np.zeros((2 * KEPT, NX))
         self.P: Array = np.zeros((2 * KEPT, NE, NE))
+
+    def place(self, t: int) -> int:
+        """``append`` or ``insert``, as the stamp wants it; 0 when ``t`` is before everything that is kept."""
+        return self.append(t) if self.n == 0 or t >= self.t[self.n - 1] else self.insert(t)
 
     def append(self, t: int) -> int:
         """Make room for an event at ``t``, ns, not before the last one; returns its index, its row is zero."""
@@ -47,7 +51,7 @@ class Timeline:
         place = int(np.searchsorted(self.t[: self.n], t, side="right"))
         if place == 0:
             return 0
-        shift = 2 * KEPT - KEPT if self.n == 2 * KEPT else 0
+        shift = KEPT if self.n == 2 * KEPT else 0
         if place - shift <= 0:
             return 0
         last = self.append(t)

@@ -1,0 +1,112 @@
+"""The way to a first place, and back when we are lost: fixes that are not believed, until some of them agree."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from foottrack_service.rotations import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Rejected:
+    """A fix that was not believed, and by how much it disagreed."""
+
+    t: int
+    point: Array
+    residual: Array
+    turn: float | None
+    """Yaw by which the tag's attitude differs from ours, rad."""
+    sigma: float
+    arm: Array
+
+
+SPAN_S = 0.12
+"""Fixes that agree lie at most so far apart, one from the next."""
+FEW = 3
+"""So many that agree start a foot whose place is unknown."""
+SURE_SPAN_S = 0.3
+"""A foot that knows its place is overruled only by fixes that agree for so long, with none accepted between."""
+SLACK = 0.012
+"""m: fixes that agree do so within this and three sigma, along a straight drift."""
+FASTEST = 4.0
+"""m/s of drift, when our velocity is wrong too."""
+SURE_FASTEST = 0.3
+"""m/s: a foot that knows its velocity is not overruled by something that does not move with it."""
+TURN_SLACK = 0.35
+"""rad."""
+DRIFT = 0.5
+"""m/s: so fast a foot that was sure may have gone wrong; what is further away is another thing."""
+SAME_TURN = 0.12
+"""rad: a tag that lies on the shoe as ours does is most likely ours, however sure the foot is of its place."""
+
+
+class Candidates:
+    """Fixes that were not believed, until enough of them agree that it is us who are wrong."""
+
+    def __init__(self) -> None:
+        self._kept: deque[Rejected] = deque(maxlen=64)
+
+    def clear(self) -> None:
+        """A fix was accepted."""
+        self._kept.clear()
+
+    def add(self, rejected: Rejected, sure_for: float | None) -> list[Rejected] | None:
+        """The fixes that agree with this newest one, oldest first, when they suffice; else None.
+
+        ``sure_for``: seconds since the last accepted fix, of a foot that knows its place and speed well; else None.
+        """
+        if self._kept and not 0 < rejected.t - self._kept[-1].t <= SPAN_S * 1e9:
+            self._kept.clear()
+        self._kept.append(rejected)
+        if sure_for is None:
+            agreeing = self._agreeing(SPAN_S, FASTEST, TURN_SLACK)
+            enough = len(agreeing) >= FEW
+        else:
+            agreeing = self._agreeing(SPAN_S, FASTEST, SAME_TURN)
+            near = float(np.linalg.norm(rejected.residual)) < SLACK + 3.0 * rejected.sigma + DRIFT * sure_for
+            same = all(k.turn is not None and abs(k.turn) < SAME_TURN for k in agreeing)
+            enough = len(agreeing) > FEW and near and same
+            if not enough:
+                agreeing = self._agreeing(2.0 * SURE_SPAN_S, SURE_FASTEST, TURN_SLACK)
+                enough = len(agreeing) > FEW and rejected.t - agreeing[0].t >= SURE_SPAN_S * 1e9
+        if not enough:
+            return None
+        self._kept.clear()
+        # Only the last few start the filter anew: the older ones belong to a time when it was still confused.
+        return agreeing[-2 * FEW :]
+
+    def _agreeing(self, span: float, fastest: float, turn_slack: float) -> list[Rejected]:
+        """Those of the last ``span`` s whose residuals lie on one straight drift with the newest one's."""
+        newest = self._kept[-1]
+        found = [newest]
+        for older in reversed(list(self._kept)[:-1]):
+            if newest.t - older.t > span * 1e9:
+                break
+            trial = [older, *found]
+            if _on_a_line(trial, fastest, turn_slack):
+                found = trial
+        return found
+
+
+def _on_a_line(kept: list[Rejected], fastest: float, turn_slack: float) -> bool:
+    t = np.array([(k.t - kept[-1].t) * 1e-9 for k in kept])
+    residuals = np.array([k.residual for k in kept])
+    slope = np.zeros(3)
+    if len(kept) > 2:
+        centred = t - t.mean()
+        slope = centred @ residuals / (centred @ centred)
+    else:
+        slope = (residuals[-1] - residuals[0]) / (t[-1] - t[0])
+    speed = float(np.linalg.norm(slope))
+    sigma = max(k.sigma for k in kept)
+    if speed * (t[-1] - t[0]) > fastest * (t[-1] - t[0]) + SLACK + 3.0 * sigma:
+        return False
+    off = residuals - residuals.mean(axis=0) - np.outer(t - t.mean(), slope)
+    if float(np.max(np.linalg.norm(off, axis=1))) > SLACK + 3.0 * sigma:
+        return False
+    turns = [k.turn for k in kept if k.turn is not None]
+    return len(turns) < 2 or all(abs(math.remainder(turn - turns[-1], math.tau)) < turn_slack for turn in turns)
