@@ -97,9 +97,11 @@ class TagDetector:
         corners, ids, _ = detector.detectMarkers(picture)
         largest: dict[int, Detection] = {}
         for tag_id, four in zip(np.asarray([] if ids is None else ids).reshape(-1), corners, strict=True):
+            if tag_id not in self._ids:
+                continue
             found = Detection(int(tag_id), np.asarray(four, dtype=np.float64).reshape(4, 2))
             known = largest.get(found.id)
-            if found.id in self._ids and (known is None or found.side_px > known.side_px):
+            if known is None or found.side_px > known.side_px:
                 largest[found.id] = found
         return list(largest.values())
 

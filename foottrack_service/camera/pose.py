@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 from foottrack_service import rotations
 from foottrack_service.camera.detector import Detection
 from foottrack_service.camera.rig import Intrinsics
-from foottrack_service.camera.targets import Target
+from foottrack_service.camera.targets import Tag, Target
 from foottrack_service.rotations import Array
 
 CORNER_SIGMA_PX = 0.25
@@ -64,13 +65,12 @@ def solve_target(
         return None
     model = np.concatenate([target.corners[d.id] for d in seen])
     rays = intrinsics.rays(np.concatenate([d.corners for d in seen]))
-    best_first = sorted(range(len(seen)), key=lambda i: -seen[i].side_px)
+    best_first = range(1) if len(seen) == 1 else sorted(range(len(seen)), key=lambda i: -seen[i].side_px)
     fits: list[_Fit] = []
     for i in best_first[:2]:
         tag = next(tag for tag in target.tags if tag.id == seen[i].id)
-        for R_tag, p_tag in _ippe(tag.size, rays[4 * i : 4 * i + 4]):
-            R = R_tag @ _matrix(tag.q).T
-            fit = _refine(R, p_tag - R @ np.asarray(tag.p), model, rays, intrinsics.focal, sigma_px)
+        for rotvec, place in _ippe(tag.size, rays[4 * i : 4 * i + 4]):
+            fit = _refine(*_of_target(tag, rotvec, place), model, rays, intrinsics.focal, sigma_px)
             if fit is not None and not any(_same(fit, other) for other in fits):
                 fits.append(fit)
     if not fits:
@@ -102,19 +102,28 @@ def _ippe(size: float, rays: Array) -> list[tuple[Array, Array]]:
     found = []
     for i in range(count):
         rotvec, place = _vector(rotvecs[i]), _vector(places[i])
-        if np.all(np.isfinite(rotvec)) and np.all(np.isfinite(place)) and place[2] > 0.0:
-            found.append((np.asarray(cv2.Rodrigues(rotvec)[0], dtype=np.float64), place))
+        if math.isfinite(rotvec.sum() + place.sum()) and place[2] > 0.0:
+            found.append((rotvec, place))
     return found
 
 
-def _refine(R: Array, p: Array, model: Array, rays: Array, focal: float, sigma_px: float) -> _Fit | None:
-    start = cv2.Rodrigues(R)[0].reshape(3, 1)
-    rotvec, place = cv2.solvePnPRefineLM(model, rays, _IDENTITY, None, start, p.reshape(3, 1).copy(), _CRITERIA)
-    rotvec, place = _vector(rotvec), _vector(place)
-    if not (np.all(np.isfinite(rotvec)) and np.all(np.isfinite(place))):
+def _of_target(tag: Tag, rotvec: Array, place: Array) -> tuple[Array, Array]:
+    """A tag's pose as its target's."""
+    if tag.p == (0.0, 0.0, 0.0) and tag.q == (0.0, 0.0, 0.0, 1.0):
+        return rotvec, place
+    R = cv2.Rodrigues(rotvec)[0] @ rotations.to_matrix(rotations.normalised(tag.q)).T
+    return _vector(cv2.Rodrigues(R)[0]), _vector(place - R @ np.asarray(tag.p))
+
+
+def _refine(rotvec: Array, p: Array, model: Array, rays: Array, focal: float, sigma_px: float) -> _Fit | None:
+    refined = cv2.solvePnPRefineLM(
+        model, rays, _IDENTITY, None, rotvec.reshape(3, 1).copy(), p.reshape(3, 1).copy(), _CRITERIA
+    )
+    rotvec, place = _vector(refined[0]), _vector(refined[1])
+    if not math.isfinite(rotvec.sum() + place.sum()):
         return None
     R = np.asarray(cv2.Rodrigues(rotvec)[0], dtype=np.float64)
-    if np.min(model @ R[2] + place[2]) <= _NEAREST_M:
+    if (model @ R[2]).min() + place[2] <= _NEAREST_M:
         return None
     projected, jacobian = cv2.projectPoints(model, rotvec, place, _IDENTITY, None)
     residual = focal * (projected.reshape(-1, 2) - rays).ravel()
@@ -122,17 +131,11 @@ def _refine(R: Array, p: Array, model: Array, rays: Array, focal: float, sigma_p
     squares = float(residual @ residual)
     # A prior on the corners' noise, updated by this picture's own residuals: blur shows in them.
     variance = (_CONFIDENCE * sigma_px**2 + squares) / (_CONFIDENCE + residual.size - 6)
-    try:
-        cov = variance * np.linalg.inv(jacobian.T @ jacobian)[3:, 3:]
-    except np.linalg.LinAlgError:
+    sound, inverse = cv2.invert(jacobian.T @ jacobian, flags=cv2.DECOMP_CHOLESKY)
+    if not sound or not math.isfinite(inverse.sum()):
         return None
-    if not np.all(np.isfinite(cov)):
-        return None
+    cov = variance * np.asarray(inverse[3:, 3:], dtype=np.float64)
     return _Fit(rotvec, R, place, squares, 0.5 * (cov + cov.T))
-
-
-def _matrix(q: tuple[float, float, float, float]) -> Array:
-    return np.eye(3) if q == (0.0, 0.0, 0.0, 1.0) else rotations.to_matrix(rotations.normalised(q))
 
 
 def _vector(column: Any) -> Array:
@@ -141,4 +144,5 @@ def _vector(column: Any) -> Array:
 
 def _same(a: _Fit, b: _Fit) -> bool:
     # |A - B|^2 of two rotations is 8 sin^2(angle / 2).
-    return bool(np.linalg.norm(a.R - b.R) < np.sqrt(2.0) * _SAME_RAD)
+    apart = (a.R - b.R).ravel()
+    return bool(apart @ apart < 2.0 * _SAME_RAD**2)
