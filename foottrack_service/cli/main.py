@@ -9,7 +9,24 @@ import typer
 from foottrack_protocol.errors import ProtocolError
 from foottrack_service.app import NodeFailed
 from foottrack_service.bus.errors import BusError
-from foottrack_service.cli import bench, calibrate, demo, evaluate, imu, log, recordings, running, service, sim, watch
+from foottrack_service.cli import (
+    bench,
+    calibrate,
+    camera,
+    demo,
+    doctor,
+    evaluate,
+    imu,
+    log,
+    markers,
+    recordings,
+    running,
+    service,
+    settings,
+    sim,
+    walk,
+    watch,
+)
 from foottrack_service.config import ConfigError
 from foottrack_service.evaluation.datasets import DatasetError
 from foottrack_service.recording.errors import RecordingError
@@ -30,8 +47,13 @@ app.command()(watch.top)
 app.command()(watch.echo)
 app.command()(evaluate.evaluate)
 app.command()(bench.bench)
+app.command()(doctor.doctor)
+app.add_typer(settings.app, name="config")
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(imu.app, name="imu")
+app.command()(camera.camera)
+app.command()(markers.markers)
+app.add_typer(walk.app, name="walk")
 app.add_typer(log.app, name="log", help="Look into recordings: info, cat, export, import, diff, recover.")
 
 

@@ -1,0 +1,179 @@
+"""``foottrack doctor``: what is plugged in, what is wrong with it, what to do about it."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from foottrack_protocol import PROTOCOL_MAJOR
+from foottrack_protocol.frames import SIDES
+from foottrack_service.cli.running import ConfigOption, ConnectOption, JsonOption, print_json, run_loop, settings_for
+from foottrack_service.config import Settings
+
+if TYPE_CHECKING:
+    from foottrack_service.bus.control_client import ControlClient
+
+_TOO_SLOW_HZ = {"imu": 50.0, "head": 60.0, "marker": 15.0}
+_MARKS = {
+    "ok": "[green]ok[/]     ",
+    "note": "[blue]note[/]   ",
+    "warning": "[yellow]warning[/]",
+    "error": "[red]error[/]  ",
+}
+_LONGEST_EXPOSURE_S = 0.003
+
+
+class Finding(NamedTuple):
+    """One thing that was looked at."""
+
+    level: Literal["ok", "note", "warning", "error"]
+    subject: str
+    text: str
+    advice: str = ""
+
+
+def doctor(
+    config: ConfigOption = None,
+    connect: ConnectOption = None,
+    probe: Annotated[
+        bool, typer.Option("--probe", help="Only whether the service answers: for health checks.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Look at ports, camera, headset, the service and its streams, and say what to do.
+
+    Exit code 0 when nothing is wrong, 1 otherwise. Example: foottrack doctor
+    """
+    settings = settings_for(config, None, connect)
+    findings = run_loop(_service(settings))
+    if not probe:
+        findings = [*_imus(settings), *_camera(settings), *findings]
+    sick = any(finding.level == "error" for finding in findings)
+    if as_json:
+        print_json({"healthy": not sick, "findings": [finding._asdict() for finding in findings]})
+    else:
+        console = Console()
+        for finding in findings:
+            text = f"{finding.subject}: {finding.text}"
+            console.print(_MARKS[finding.level], escape(text), highlight=False)
+            if finding.advice:
+                console.print(f"         {escape(finding.advice)}", highlight=False)
+    raise typer.Exit(int(sick))
+
+
+def _imus(settings: Settings) -> list[Finding]:
+    from foottrack_service.imu import ports
+
+    there = ports.available()
+    named = ", ".join(port.device for port in there) or "none"
+    found = [Finding("ok" if there else "note", "serial ports", named)]
+    for side in SIDES:
+        device = getattr(settings.imu, side)
+        if device.format == "off":
+            found.append(
+                Finding(
+                    "note", f"imu {side}", "no device is configured", f"Name one under [imu.{side}], if there is one."
+                )
+            )
+        elif device.format == "slimevr":
+            found.append(
+                Finding("ok", f"imu {side}", f"a SlimeVR tracker, awaited on UDP port {settings.imu.slimevr_port}")
+            )
+        else:
+            try:
+                port = ports.find(device.port, there)
+            except ports.PortNotFound as error:
+                found.append(
+                    Finding("error", f"imu {side}", str(error), "Plug it in, or mend the port in the settings.")
+                )
+            else:
+                found.append(Finding("ok", f"imu {side}", f"{device.format} on {port}"))
+    return found
+
+
+def _camera(settings: Settings) -> list[Finding]:
+    source = settings.camera.source
+    if source.kind == "none":
+        return [Finding("note", "camera", "none is configured", "Choose one under [camera.source], if there is one.")]
+    found = [Finding("ok", "camera", f"{source.kind}, exposure {1e3 * source.exposure:g} ms")]
+    if source.exposure > _LONGEST_EXPOSURE_S:
+        found.append(Finding("warning", "exposure", "walking feet blur", "Set it to at most 0.003 s and add light."))
+    if source.kind == "realsense" and find_spec("pyrealsense2") is None:
+        found.append(
+            Finding("error", "camera", "pyrealsense2 is not installed", "Install it: pip install foottrack[realsense]")
+        )
+    sizes = sorted({tag.size for side in SIDES for tag in settings.camera.targets.of(side).tags})
+    printed = ", ".join(f"{1e3 * size:g}" for size in sizes)
+    found.append(
+        Finding(
+            "note", "tags", f"{settings.camera.dictionary}, {printed} mm", "Measure the print's ruler: scale matters."
+        )
+    )
+    return found
+
+
+async def _service(settings: Settings) -> list[Finding]:
+    from foottrack_service.bus.connection import Bus
+    from foottrack_service.bus.errors import ControlError
+
+    with Bus.connect(settings.bus) as bus:
+        client = bus.control()
+        try:
+            session = await client.request("hello")
+        except ControlError as error:
+            return [Finding("error", "service", str(error), "Start it with: foottrack run")]
+        found = [Finding("ok", "service", f"session {session['session']}, users {', '.join(session['users'])}")]
+        major = session["protocol"]["major"]
+        if major != PROTOCOL_MAJOR:
+            found.append(Finding("error", "protocol", f"it speaks {major}, we {PROTOCOL_MAJOR}", "Update the older."))
+        return found + await _streams(client, settings.user)
+
+
+async def _streams(client: ControlClient, user: str) -> list[Finding]:
+    health: dict[str, Any] = await client.request("status")
+    found = [
+        Finding(
+            "error" if node["state"] in ("failed", "restarting") else "ok",
+            f"node {name}",
+            node["state"],
+            node["error"] or "",
+        )
+        for name, node in health["nodes"].items()
+    ]
+    for topic, stats in health["topics"].items():
+        kind = topic.removeprefix(f"{user}/").partition("/")[0]
+        wanted = _TOO_SLOW_HZ.get(kind)
+        lost = f", {stats['gaps']} lost" if stats["gaps"] else ""
+        drops = "".join(f", {count} refused: {reason}" for reason, count in stats["drops"].items())
+        slow = wanted is not None and stats["hz"] < wanted
+        advice = f"Expected at least {wanted:g} Hz." if slow else ""
+        level: Literal["ok", "warning"] = "warning" if slow or lost or drops else "ok"
+        found.append(Finding(level, topic, f"{stats['hz']:.0f} Hz{lost}{drops}", advice))
+    for reason, count in health["drops"].items():
+        found.append(Finding("warning", "bus", f"{count} messages of no known topic refused: {reason}"))
+    if f"{user}/head/pose" not in health["topics"]:
+        found.append(
+            Finding(
+                "note",
+                "headset",
+                "nobody publishes head/pose",
+                "Without it feet come without legs, and no camera helps.",
+            )
+        )
+    for name, counts in health["filters"].items():
+        total = sum(counts["accepted"].get(kind, 0) for kind in ("marker", "depth"))
+        refused = sum(count for reason, count in counts["rejected"].items() if reason not in ("unused", "invalid"))
+        if total + refused > 100 and refused > total:
+            found.append(
+                Finding(
+                    "warning",
+                    f"fixes {name}",
+                    f"{refused} of {total + refused} refused",
+                    "Check tag sizes, ids and the mount.",
+                )
+            )
+    return found

@@ -1,0 +1,147 @@
+"""The command line as a person uses it: in processes of its own."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+FOOTTRACK = [sys.executable, "-c", "from foottrack_service.cli.main import main; main()"]
+
+
+def foottrack(*args: object, cwd: Path, code: int = 0, timeout: float = 60.0) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end, and check its exit code."""
+    done = subprocess.run(
+        [*FOOTTRACK, *map(str, args)], capture_output=True, text=True, timeout=timeout, cwd=cwd, check=False
+    )
+    assert done.returncode == code, done.stderr + done.stdout
+    assert "Traceback" not in done.stderr
+    return done
+
+
+@contextmanager
+def running(cwd: Path, *args: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """``foottrack run`` on free ports, and the address to connect to; the ports are in a row only by luck."""
+    process = subprocess.Popen([*FOOTTRACK, "run", "--listen", "0", *args], stderr=subprocess.PIPE, text=True, cwd=cwd)
+    try:
+        assert process.stderr is not None
+        said = process.stderr.readline()
+        yield process, said
+    finally:
+        process.kill()
+        process.wait()
+        process.stderr.close()
+
+
+@pytest.mark.slow
+def test_demo_reports_rates_errors_and_latency(tmp_path: Path) -> None:
+    done = foottrack(
+        "demo", "--seconds", 4, "--listen", 0, "--task", "steps", "--record", "demo.mcap", "--json", cwd=tmp_path
+    )
+    found = json.loads(done.stdout)
+    assert set(found) == {"seconds", "streams", "error_mm", "latency_ms"}
+    assert found["seconds"] >= 4.0
+    assert set(found["error_mm"]["left"]) == {"mean", "median", "p95", "max"}
+    assert 0.0 < found["error_mm"]["right"]["median"] < 60.0
+    assert found["streams"]["user/pose/body"]["hz"] > 50.0
+    assert all(stream["gaps"] == 0 for stream in found["streams"].values())
+    assert 0.0 < found["latency_ms"]["p50"] <= found["latency_ms"]["p99"]
+    info = json.loads(foottrack("log", "info", "demo.mcap", "--json", cwd=tmp_path).stdout)
+    assert "user/pose/body" in str(info["topics"])
+
+
+@pytest.mark.slow
+def test_a_simulation_replays_offline_to_the_same_file(tmp_path: Path) -> None:
+    foottrack("sim", "--task", "line", "--seconds", 3, "--out", "line.mcap", cwd=tmp_path)
+    for out in ("first.mcap", "second.mcap"):
+        foottrack("replay", "line.mcap", "--offline", "--out", out, cwd=tmp_path)
+    assert (tmp_path / "first.mcap").read_bytes() == (tmp_path / "second.mcap").read_bytes()
+    foottrack("log", "diff", "first.mcap", "second.mcap", cwd=tmp_path)
+    refused = foottrack("replay", "line.mcap", "--offline", "--out", "first.mcap", cwd=tmp_path, code=1)
+    assert "exists already" in refused.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals to other processes are POSIX's")
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_the_service_ends_cleanly_when_told(tmp_path: Path, stop: signal.Signals) -> None:
+    with running(tmp_path) as (process, said):
+        assert re.search(r"publishers tcp://127\.0\.0\.1:\d+", said)
+        process.send_signal(stop)
+        assert process.wait(10) == 0
+        assert process.stderr is not None
+        assert process.stderr.read().strip() == "Stopped."
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals to other processes are POSIX's")
+def test_ctrl_c_closes_a_demo_s_recording(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [*FOOTTRACK, "demo", "--seconds", "60", "--listen", "0", "--record", "cut.mcap"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+    )
+    assert process.stderr is not None and process.stdout is not None
+    assert "walk-in-place" in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == 0, err
+    assert "Stopped early" in err
+    assert "Recorded to cut.mcap" in out
+    assert (tmp_path / "cut.mcap").exists()
+    foottrack("log", "info", "cut.mcap", cwd=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("args", "code", "helps"),
+    [
+        (["demo", "--task", "flying"], 2, "walk-in-place"),
+        (["node", "toaster"], 2, "fusion"),
+        (["run", "--listen", "tcp://0.0.0.0:7701"], 1, "loopback"),
+        (["run", "--listen", "nowhere"], 2, "tcp://127.0.0.1:7701"),
+        (["run", "--config", "missing.toml"], 2, "missing.toml"),
+        (["top", "--connect", "7991", "--seconds", "1"], 1, "is the service running"),
+        (["replay", "broken.mcap", "--offline", "--out", "x.mcap"], 1, "broken.mcap"),
+        (["replay", "broken.mcap", "--offline"], 2, "--out"),
+        (["evaluate", "--tasks", "dancing"], 2, "knee-bends"),
+        (["evaluate", "--seeds", "one"], 2, "whole numbers"),
+        (["evaluate", "--real", "nowhere"], 1, "imu_sample.csv"),
+        (["config", "check", "--config", "typo.toml"], 2, "heihgt"),
+    ],
+)
+def test_what_a_person_can_get_wrong_is_one_helpful_line(
+    tmp_path: Path, args: list[str], code: int, helps: str
+) -> None:
+    (tmp_path / "broken.mcap").write_bytes(b"\x89MCAP0\r\nnonsense")
+    (tmp_path / "typo.toml").write_text("[body]\nheihgt = 1.8\n")
+    done = foottrack(*args, cwd=tmp_path, code=code)
+    assert helps in done.stderr
+    assert len(done.stderr.strip().splitlines()) == (1 if "flying" not in args else done.stderr.strip().count("\n") + 1)
+
+
+def test_settings_are_written_commented_and_read_back(tmp_path: Path) -> None:
+    foottrack("config", "init", cwd=tmp_path)
+    found = json.loads(foottrack("config", "check", "--json", cwd=tmp_path).stdout)
+    assert found["settings"] == {}
+    (tmp_path / "foottrack.toml").write_text("[body]\nheight = 1.62\n")
+    found = json.loads(foottrack("config", "check", "--json", cwd=tmp_path).stdout)
+    assert found["settings"] == {"body.height": {"value": 1.62, "from": "foottrack.toml"}}
+    foottrack("config", "init", cwd=tmp_path, code=1)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals to other processes are POSIX's")
+def test_doctor_says_what_is_wrong(tmp_path: Path) -> None:
+    done = foottrack("doctor", "--probe", "--connect", "7991", "--json", cwd=tmp_path, code=1)
+    assert not json.loads(done.stdout)["healthy"]
+    (tmp_path / "foottrack.toml").write_text('[imu.left]\nformat = "rvc"\nport = "1234:abcd"\n')
+    done = foottrack("doctor", "--connect", "7991", "--json", cwd=tmp_path, code=1)
+    levels = {finding["subject"]: finding["level"] for finding in json.loads(done.stdout)["findings"]}
+    assert levels["imu left"] == "error"
+    assert levels["service"] == "error"
