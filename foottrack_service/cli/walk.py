@@ -25,6 +25,7 @@ from foottrack_service.cli.running import (
 from foottrack_service.cli.walk_source import cycle_of, knobs, project_of, walk_of
 
 if TYPE_CHECKING:
+    from foottrack_service.walkcycle.project import Project
     from foottrack_service.walkcycle.walk import Walk
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
@@ -288,10 +289,24 @@ def measure(
 
     projects = [project_of(source)] if source else [project_of(name) for name in PRESETS]
     figures = measure_all(projects, [path] if path else None)
+    rate = _frames_per_second(project_of(source or "normative"))
     if json:
-        print_json(figures)
+        print_json({"walks": figures, "frames_per_s": rate})
     else:
         typer.echo(table(figures))
+        typer.echo(f"{rate:.0f} frames generated per second (a minute round a circle at 60 fps)")
+
+
+def _frames_per_second(project: Project) -> float:
+    from time import perf_counter
+
+    import numpy as np
+
+    made = walk_of(project, "circle:10,360", None, 60.0, None, None)
+    times = np.arange(0.0, made.duration, 1.0 / 60.0)
+    began = perf_counter()
+    made.motion(times)
+    return len(times) / (perf_counter() - began)
 
 
 def _report(out: Path, walk: Walk, json: bool) -> None:

@@ -22,6 +22,8 @@ Array = npt.NDArray[np.float64]
 
 _PENETRATION_M = 2e-4
 """Depth under the floor that is left alone in swing: below what anybody sees, and half of what is promised."""
+_CLEARANCE_M = 0.004
+"""Least height of a foot in swing, at 1.75 m: between two keys of a file it sinks by half a millimetre."""
 _GRID = np.linspace(0.0, 1.0, 201)
 
 
@@ -55,9 +57,11 @@ def lowest_point(body: Humanoid, ankle_height: Array, pitch: Array, toes_pitch: 
     return np.asarray(ankle_height + np.minimum(heel, np.minimum(ball - body.ball_height, ball + tip)))
 
 
-def toes_above_floor(body: Humanoid, ankle_height: Array, pitch: Array, toes_pitch: Array) -> Array:
-    """The toes' pitch (n,) rad, bent up by the floor where they would go through it."""
-    ball = ankle_height + turned(pitch, body.ball[1], body.ball[2])[..., 0]
+def toes_above_floor(body: Humanoid, swing: Array, ankle_height: Array, pitch: Array, toes_pitch: Array) -> Array:
+    """The toes' pitch (n,) rad over a swing (share (n,)), bent up where they would come too near to the floor."""
+    ball = (
+        ankle_height - _CLEARANCE_M * body.scale * _raising(swing) + turned(pitch, body.ball[1], body.ball[2])[..., 0]
+    )
     length = float(np.hypot(body.toe_tip[1], body.toe_tip[2]))
     slope = float(np.arctan2(-body.toe_tip[1], body.toe_tip[2]))
     return np.asarray(np.maximum(toes_pitch, slope - np.arcsin(np.clip(ball / length, -1.0, 1.0))))
@@ -145,9 +149,10 @@ def foot_curves(body: Humanoid, timing: ContactTiming, keys: FootKeys, stride: f
 
     grid = timing.toe_off + _GRID * (1.0 - timing.toe_off)
     height = travel(grid)[:, 1] + rolled_ankle(body, rolling_pitch(grid), share(_GRID))[:, 0]
-    toes = toes_above_floor(body, height, rolling_pitch(grid), toes_pitch(grid))
-    depth = -lowest_point(body, height, rolling_pitch(grid), toes) - _PENETRATION_M
+    toes = toes_above_floor(body, _GRID, height, rolling_pitch(grid), toes_pitch(grid))
     bump = _raising(_GRID)
+    clearance = _CLEARANCE_M * body.scale * bump
+    depth = clearance - lowest_point(body, height, rolling_pitch(grid), toes) - _PENETRATION_M
     lift = float(np.max(np.where(depth > 0.0, depth / np.maximum(bump, 1e-9), 0.0)))
     if lift > body.shank / 3.0:
         worst = float(grid[np.argmax(depth)])

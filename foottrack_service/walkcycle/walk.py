@@ -215,7 +215,7 @@ class Walk:
             ],
             axis=-1,
         )
-        return ankle, facing, pitch, toes_above_floor(self.body, ankle[:, 1], pitch, toes)
+        return ankle, facing, pitch, toes_above_floor(self.body, u, ankle[:, 1], pitch, toes)
 
 
 def walk_along(
