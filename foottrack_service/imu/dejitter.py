@@ -10,6 +10,7 @@ the line is then lowered to the earliest arrivals.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from foottrack_service.imu.sample import DeviceClock
@@ -146,7 +147,9 @@ class _Fit:
             self._p01 *= gain
             self._p00 *= gain
             # The floor stays where it was when the line moves under it.
-            self._floor_s = min(self._floor_s - k0 * pull + FLOOR_RISE * max(dt, 0.0), arrival - self._offset_s)
+            # Faster by a standard deviation of the slope: in the first seconds it may have been too steep.
+            rise = (FLOOR_RISE + _NOISE_S * math.sqrt(self._p11)) * max(dt, 0.0)
+            self._floor_s = min(self._floor_s - k0 * pull + rise, arrival - self._offset_s)
         return self._t0 + round((self._offset_s + min(self._floor_s, arrival - self._offset_s)) * 1e9)
 
     def _advance(self, total: int, dt: float) -> None:

@@ -157,6 +157,31 @@ def test_a_lost_report_costs_its_own_cycle_only(lost: Report) -> None:
     assert decoder.drops["unpaired"] == 2
 
 
+def test_a_damaged_sequence_number_costs_its_own_cycle_and_one_more() -> None:
+    decoder, _ = configured()
+    sender = ShtpSender()
+    cycles = []
+    for cycle in range(12):
+        for kind in sh2.SENSORS:
+            values = (0.0, 0.0, 0.0, 1.0) if kind == Report.GAME_ROTATION_VECTOR else (cycle / 256.0, 0.0, 9.75)
+            damage = 4 if cycle == 5 and kind == Report.GYROSCOPE else 0
+            frame = input_frame(sender, SensorReport(kind, cycle + damage, 3, 0, values))
+            cycles += [round(sample.acc[0] * 256) for sample in decoder.feed(frame)]
+    assert cycles == [0, 1, 2, 3, 4, 7, 8, 9, 10, 11]
+
+
+def test_sequences_of_cargoes_that_go_back_are_no_loss() -> None:
+    decoder, device = configured()
+    sample = motion(1, 2500)[0]
+    for _ in range(40):
+        decoder.feed(device.measure(sample))
+    # Its reset message was lost; what follows counts from 0 again.
+    device.start()
+    decoder.feed(device.hear(ShtpSender().frame(Channel.CONTROL, sh2.set_feature(Report.GYROSCOPE, 2500))))
+    decoder.feed(device.measure(sample))
+    assert decoder.drops["lost"] == 0
+
+
 def test_kinds_that_run_at_different_rates_are_brought_in_step_again() -> None:
     decoder, _ = configured()
     sender = ShtpSender()

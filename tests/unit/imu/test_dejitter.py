@@ -56,13 +56,13 @@ class Run:
 
 
 @pytest.mark.parametrize("clock", [MICROS, RVC, SHTP])
-@pytest.mark.parametrize("jitter", [scheduler, usb_polls_each_16_ms, radio])
-def test_jitter_of_8_ms_becomes_errors_below_one(clock: DeviceClock, jitter: Jitter) -> None:
+@pytest.mark.parametrize(("jitter", "spread_ms"), [(scheduler, 0.2), (usb_polls_each_16_ms, 0.4), (radio, 0.4)])
+def test_jitter_of_8_ms_becomes_errors_below_one(clock: DeviceClock, jitter: Jitter, spread_ms: float) -> None:
     run = Run(clock, 80e-6 if clock is MICROS else 2e-3, jitter)
     raw_ms = (run.arrival - run.true - LATENCY_S) * 1e3
     assert np.mean(raw_ms) > 1.9
     assert abs(np.mean(run.settled)) < 1.0
-    assert np.std(run.settled) < 1.0
+    assert np.std(run.settled) < spread_ms
     assert np.std(run.settled) < 0.3 * np.std(raw_ms)
     assert run.dejitter.resets == 0
 

@@ -93,6 +93,10 @@ def test_missing_sequence_numbers_are_counted() -> None:
     for sequence in (254, 255, 2):
         assert len(decoder.feed(encode(sample, sequence))) == 1
     assert decoder.drops["lost"] == 2
+    for sequence in (100, 0, 1):
+        decoder.feed(encode(sample, sequence))
+    # 97 between 2 and 100; the way back to 0 is a device that started anew.
+    assert decoder.drops["lost"] == 2 + 97
 
 
 @pytest.mark.parametrize(

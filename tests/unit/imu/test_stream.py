@@ -30,6 +30,7 @@ def test_jittered_bytes_become_regular_messages_in_the_wires_axes(name: str) -> 
         errors.append(message.t - (START + k * PERIOD - 3_000_000))
         assert message.imu.acc == pytest.approx((sample.acc[0], sample.acc[2], -sample.acc[1]), abs=0.01)
     assert np.std(errors[500:]) < 0.5e6
+    assert abs(np.mean(errors[500:])) < 0.5e6
     assert not any(stream.drops.values())
 
 
