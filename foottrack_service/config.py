@@ -58,6 +58,9 @@ class BodySettings(Section):
     torso: Positive | None = None
     hip_width: Positive | None = None
     hip_back: Float | None = None
+    solver: Literal["two-bone", "fabrik"] = Field(
+        default="two-bone", description="hips by trunk and legs, or by a spine with joint limits besides (FABRIK)"
+    )
 
 
 class FootSettings(Section):

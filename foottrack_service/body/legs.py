@@ -1,95 +1,58 @@
-"""Legs from head and feet: hips below the head, knees in the plane triangle of thigh and shank.
+"""Two-bone legs: the knee in the triangle of thigh and shank, bent about the knee's own axis.
 
-In plain floats: it runs for every pose on its way to an engine, and three numbers are too few for arrays.
+In plain floats, as it runs for every pose on its way to an engine.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
-from foottrack_protocol.messages import Side
 from foottrack_service.body.skeleton import Skeleton
+from foottrack_service.body.vectors import SHORTEST, Quaternion, Vec, cross, dot, norm, sub, turned, unit, without
 
-Vec = tuple[float, float, float]
+FOOT_SHARE = 0.35
+"""How much the foot turns the knee's axis out of the pelvis's: 0.2 to 0.5 are alike on motion capture."""
 
-REACH = 0.99
-"""A leg is never straighter than this share of its length, so that a knee always has a direction to bend to."""
-_ROUNDS = 8
-
-
-@dataclass(frozen=True, slots=True)
-class Legs:
-    """Hips (centre m, rotation to the stage, upright), and hip joint and knee [m] of each foot that there is."""
-
-    hips: Vec
-    hips_q: tuple[float, float, float, float]
-    joints: dict[Side, Vec]
-    knees: dict[Side, Vec]
+_RIGHT: Vec = (1.0, 0.0, 0.0)
 
 
-def solve_legs(head_p: Sequence[float], head_q: Sequence[float], ankles: Mapping[Side, Vec], body: Skeleton) -> Legs:
-    """Legs of a person who stands below the head (m, stage; q head to stage) on these ankles (m, stage).
+def knee_axis(pelvis_right: Vec, pelvis_forward: Vec, foot_q: Quaternion | None) -> Vec:
+    """The axis (unit, level, to the right) about which a knee bends, between the pelvis's and the foot's lateral axes.
 
-    The hips face where the head faces, and come down or across until both feet are within reach. Knees bend forwards.
+    A foot's forward axis flips when it points down at push-off; its lateral axis does not. It counts the less, the
+    further it is turned out, and not at all when it points the other way: no foot can turn a knee round.
     """
-    qy, qw = head_q[1], head_q[3]
-    norm = math.hypot(qy, qw)
-    qy, qw = (qy / norm, qw / norm) if norm > 1e-9 else (0.0, 1.0)
-    sine, cosine = 2.0 * qy * qw, qw * qw - qy * qy
-    back, half = body.hip_back, 0.5 * body.hip_width
-    hips = (head_p[0] + back * sine, head_p[1] - body.torso, head_p[2] + back * cosine)
-    offsets: dict[Side, Vec] = {
-        side: (half * cosine, 0.0, -half * sine) if side == "right" else (-half * cosine, 0.0, half * sine)
-        for side in ankles
-    }
-    hips = _within_reach(hips, offsets, ankles, REACH * (body.thigh + body.shank))
-    joints = {side: _add(hips, offset) for side, offset in offsets.items()}
-    forward = (-sine, 0.0, -cosine)
-    knees = {side: knee(joints[side], ankle, forward, body) for side, ankle in ankles.items()}
-    return Legs(hips, (0.0, qy, 0.0, qw), joints, knees)
+    if foot_q is None:
+        return pelvis_right
+    x, _, z = turned(foot_q, _RIGHT)
+    share = FOOT_SHARE * max(0.0, x * pelvis_right[0] + z * pelvis_right[2])
+    rest = 1.0 - FOOT_SHARE
+    return unit((rest * pelvis_right[0] + share * x, 0.0, rest * pelvis_right[2] + share * z), pelvis_right)
 
 
-def knee(hip: Vec, ankle: Vec, pole: Vec, body: Skeleton) -> Vec:
-    """The knee between hip and ankle, m, that bends towards the direction ``pole``.
+def knee(hip: Vec, ankle: Vec, axis: Vec, forward: Vec, body: Skeleton) -> Vec:
+    """The knee between hip and ankle, m, bent forwards about ``axis`` (unit, level, to the right).
 
-    Thigh and shank keep their lengths where the ankle is within reach; else the knee is on the straight line.
+    Thigh and shank keep their lengths wherever a leg can reach the ankle. Beyond that the leg is straight and the thigh
+    keeps its length: what is missing is missing at the ankle, which is where the foot was measured. ``forward`` (unit)
+    is where the knee goes when the leg lies along the axis.
     """
     thigh, shank = body.thigh, body.shank
-    lx, ly, lz = ankle[0] - hip[0], ankle[1] - hip[1], ankle[2] - hip[2]
-    length = math.sqrt(lx * lx + ly * ly + lz * lz)
-    if length < 1e-9:
-        return (hip[0] + pole[0] * thigh, hip[1] + pole[1] * thigh, hip[2] + pole[2] * thigh)
-    ux, uy, uz = lx / length, ly / length, lz / length
-    along = pole[0] * ux + pole[1] * uy + pole[2] * uz
-    sx, sy, sz = pole[0] - along * ux, pole[1] - along * uy, pole[2] - along * uz
-    norm = math.sqrt(sx * sx + sy * sy + sz * sz)
-    if norm < 1e-9:  # the leg points where the knee should: bend upwards, or backwards if it is upright
-        sx, sy, sz = (-uy * ux, 1.0 - uy * uy, -uy * uz) if abs(uy) < 0.9 else (0.0, -uz, uy)
-        norm = math.sqrt(sx * sx + sy * sy + sz * sz)
+    leg = sub(ankle, hip)
+    length = norm(leg)
+    if length < SHORTEST:
+        return (hip[0] + forward[0] * thigh, hip[1] + forward[1] * thigh, hip[2] + forward[2] * thigh)
+    ux, uy, uz = down = (leg[0] / length, leg[1] / length, leg[2] / length)
+    sx, sy, sz = bend_direction(down, axis, forward)
     reached = min(max(length, abs(thigh - shank)), thigh + shank)
     ahead = (thigh * thigh - shank * shank + reached * reached) / (2.0 * reached)
-    out = math.sqrt(max(0.0, thigh * thigh - ahead * ahead)) / norm
+    out = math.sqrt(max(0.0, thigh * thigh - ahead * ahead))
     return (hip[0] + ux * ahead + sx * out, hip[1] + uy * ahead + sy * out, hip[2] + uz * ahead + sz * out)
 
 
-def _within_reach(hips: Vec, offsets: Mapping[Side, Vec], ankles: Mapping[Side, Vec], reach: float) -> Vec:
-    # Each pull shortens one leg to its reach; a few rounds satisfy both unless the feet are too far apart for it.
-    for _ in range(_ROUNDS):
-        moved = False
-        for side, ankle in ankles.items():
-            leg = _add(hips, offsets[side])
-            dx, dy, dz = ankle[0] - leg[0], ankle[1] - leg[1], ankle[2] - leg[2]
-            length = math.sqrt(dx * dx + dy * dy + dz * dz)
-            if length > reach:
-                pull = 1.0 - reach / length
-                hips = (hips[0] + dx * pull, hips[1] + dy * pull, hips[2] + dz * pull)
-                moved = True
-        if not moved:
-            break
-    return hips
-
-
-def _add(a: Vec, b: Vec) -> Vec:
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+def bend_direction(leg: Vec, axis: Vec, forward: Vec) -> Vec:
+    """Where the knee of a leg that points along ``leg`` (unit, hip to ankle) goes: unit, across the leg."""
+    across = cross(axis, leg)
+    if dot(across, across) > 1e-12:
+        return unit(across, forward)
+    return unit(without(forward, leg), (0.0, 1.0, 0.0))

@@ -18,6 +18,11 @@ _HIP_WIDTH = 0.191 * 0.53
 _HIP_BACK = 0.05
 """The hips' centre lies about 9 cm behind the eyes of a person of 1.75 m who stands upright."""
 
+# The head nods about a point in the upper neck. Oculus's head model has it 75 mm below and 80.5 mm behind the eyes; a
+# look down to the feet bends the lower neck too, so it is further down.
+EYES_ABOVE_NECK = 0.10
+EYES_BEFORE_NECK = 0.085
+
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:

@@ -25,8 +25,8 @@ from foottrack_protocol.messages import (
     Side,
 )
 from foottrack_service import rotations as rot
-from foottrack_service.body.legs import Legs, solve_legs
 from foottrack_service.body.skeleton import Skeleton
+from foottrack_service.body.solver import BodySolver, FootPlace, Legs
 from foottrack_service.config import Settings
 from foottrack_service.fusion.foot import Foot
 from foottrack_service.fusion.head_history import HeadHistory
@@ -44,7 +44,7 @@ class FusionCore:
     def __init__(self, settings: Settings, sid: str = "offline") -> None:
         self._user = settings.user
         self._sid = sid
-        self._skeleton = Skeleton.of(settings.body)
+        self._body = BodySolver(Skeleton.of(settings.body), settings.body.solver)
         self._heads = HeadHistory()
         self._origin: int | None = None
         self._feet: dict[Side, Foot] = {side: Foot(settings, side, self._heads) for side in SIDES}
@@ -115,6 +115,7 @@ class FusionCore:
                 self._heads.move(p, q)
             for foot in self._feet.values():
                 foot.on_recentred(p, q)
+            self._body.reset()
         self._origin = body.origin
         if not body.tracked or body.p is None or body.q is None or max(map(abs, body.p)) > _MOST_DISTANCE:
             self._heads.add_untracked(t)
@@ -129,7 +130,7 @@ class FusionCore:
             for foot in self._feet.values():
                 foot.on_floor(found.values.height)
         elif isinstance(found, BodyCalibration):
-            self._skeleton = Skeleton.calibrated(found.values)
+            self._body.skeleton = Skeleton.calibrated(found.values)
         elif isinstance(found, HeadingCalibration):
             for side, foot in self._feet.items():
                 yaw = getattr(found.values.imu_yaw, side)
@@ -154,8 +155,8 @@ class FusionCore:
             head = None
         legs = None
         if head is not None:
-            ankles = {side: _vec(found.p) for side, found in feet.items()}
-            legs = solve_legs(head.p.tolist(), head.q.tolist(), ankles, self._skeleton)
+            places = {side: FootPlace(_vec(found.p), _quat(found.q)) for side, found in feet.items()}
+            legs = self._body.solve(now, head.p.tolist(), head.q.tolist(), places)
         body = BodyPose(
             head=None if head is None else _pose(head.p, head.q),
             hips=None if legs is None else Pose(p=legs.hips, q=legs.hips_q),
@@ -190,6 +191,10 @@ def _vec(v: Array) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _pose(p: Array, q: Array) -> Pose:
+def _quat(q: Array) -> tuple[float, float, float, float]:
     x, y, z, w = q.tolist()
-    return Pose(p=_vec(p), q=(x, y, z, w))
+    return x, y, z, w
+
+
+def _pose(p: Array, q: Array) -> Pose:
+    return Pose(p=_vec(p), q=_quat(q))

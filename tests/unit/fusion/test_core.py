@@ -63,7 +63,7 @@ def test_head_and_tags_alone_bring_legs():
     body = outs[-1].data
     assert body.head.p == (0.0, 1.6, 0.0)
     assert body.left.stage == body.right.stage == "marker"
-    skeleton = core._skeleton
+    skeleton = core._body.skeleton
     for leg in (body.left, body.right):
         assert math.dist(leg.hip, leg.knee) == pytest.approx(skeleton.thigh)
         assert math.dist(leg.knee, leg.ankle.p) == pytest.approx(skeleton.shank)
