@@ -43,6 +43,11 @@ def rolled_ankle(body: Humanoid, pitch: npt.ArrayLike, ball_share: npt.ArrayLike
     return np.asarray(share * on_ball + (1.0 - share) * on_heel)
 
 
+def ball_share(swing: Array, strikes_on_ball: bool) -> Array:
+    """What a foot rolls on over its swing (share (n,)): 1 the ball that it leaves with, 0 the heel that it lands on."""
+    return np.ones_like(swing) if strikes_on_ball else 1.0 - smooth_step(swing)
+
+
 def planted_ankle(body: Humanoid, pitch: npt.ArrayLike) -> Array:
     """Ankle (up, forward), (n, 2) m, of a planted foot: over the ball with the toes down, else over the heel."""
     return rolled_ankle(body, pitch, np.asarray(pitch) < 0.0)
@@ -82,10 +87,6 @@ class FootCurves:
     toes_pitch: Curve
     travel: Curve
     yaw: Curve
-
-    def ball_share(self, swing: Array) -> Array:
-        """What the foot rolls on over its swing, 0 to 1: 1 the ball, 0 the heel."""
-        return np.ones_like(swing) if self.strikes_on_ball else 1.0 - smooth_step(swing)
 
 
 @dataclass(frozen=True)
@@ -133,11 +134,8 @@ def foot_curves(body: Humanoid, timing: ContactTiming, keys: FootKeys, stride: f
     toes_pitch = through(timing.toe_off, land, toe + pitch, (0.0, 0.0))
     yaw_curve = through(timing.toe_off, 1.0, yaw, (0.0, 0.0))
 
-    def share(swing: Array) -> Array:
-        return np.ones_like(swing) if strikes_on_ball else 1.0 - smooth_step(swing)
-
     swing = (phases - timing.toe_off) / (1.0 - timing.toe_off)
-    rolled = rolled_ankle(body, pitch, share(swing))
+    rolled = rolled_ankle(body, pitch, ball_share(swing, strikes_on_ball))
     travelled = ankle - np.stack([np.zeros_like(swing), rolled[:, 0], rolled[:, 1]], axis=-1)
     # What lands fast slips between the keys of a file: over the floor, the last of the way belongs to the landing.
     gone = np.array([0.0, stride])
@@ -148,7 +146,7 @@ def foot_curves(body: Humanoid, timing: ContactTiming, keys: FootKeys, stride: f
         return np.insert(level(phase), 1, rise(phase), axis=-1)
 
     grid = timing.toe_off + _GRID * (1.0 - timing.toe_off)
-    height = travel(grid)[:, 1] + rolled_ankle(body, rolling_pitch(grid), share(_GRID))[:, 0]
+    height = travel(grid)[:, 1] + rolled_ankle(body, rolling_pitch(grid), ball_share(_GRID, strikes_on_ball))[:, 0]
     toes = toes_above_floor(body, _GRID, height, rolling_pitch(grid), toes_pitch(grid))
     bump = _raising(_GRID)
     clearance = _CLEARANCE_M * body.scale * bump

@@ -20,7 +20,7 @@ from foottrack_service.walkcycle.errors import PathError
 from foottrack_service.walkcycle.footprints import Footprint, Plan, plan_walk
 from foottrack_service.walkcycle.legs import close_leg, reachable_height
 from foottrack_service.walkcycle.path import Path
-from foottrack_service.walkcycle.rollover import rolled_ankle, toes_above_floor
+from foottrack_service.walkcycle.rollover import ball_share, rolled_ankle, toes_above_floor
 from foottrack_service.walkcycle.skeleton import INDEX, JOINTS, POSED_JOINTS, SIDES, Humanoid
 from foottrack_service.walkcycle.standing import standing_pose
 from foottrack_service.walkcycle.timing import Clock, make_clock
@@ -202,7 +202,7 @@ class Walk:
         pitch, toes = scale * curves.pitch(own), scale * curves.toes_pitch(own)
         turn = np.mod(following.yaw - now.yaw + np.pi, 2.0 * np.pi) - np.pi
         travel = curves.travel(own)
-        rolled = rolled_ankle(self.body, pitch, curves.ball_share(u))
+        rolled = rolled_ankle(self.body, pitch, ball_share(u, curves.strikes_on_ball))
         facing = now.yaw + turn * warp + curves.yaw(own)
         # The rolling point goes beside the path as it bends, from one footprint to the next, and rests at both.
         arc = now.arc + travel[:, 2] / self.cycle.stride * (following.arc - now.arc)
