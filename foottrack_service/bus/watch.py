@@ -85,8 +85,10 @@ class SocketWatch:
     def _on_word(self) -> None:
         if self._on_input is not None:
             self._on_input()
-        if self._waiters:
-            self._wake(self._events())
+            if not self._waiters:
+                return
+        # Also when nobody waits: asking takes the word back, and the loop would spin on it until somebody reads.
+        self._wake(self._events())
 
     def _wake(self, events: int) -> None:
         for waiter, wanted in self._waiters.items():
