@@ -29,10 +29,12 @@ def compiled(function: F) -> F:
 
 def _cache_folder() -> str:
     # Numba renews a function's cache when its own file changes, but not when a constant or a function that it takes
-    # from another file does: so the cache is named by all files of this room.
+    # from another file does: so the cache is named by all files of this room that have or feed kernels.
     digest = hashlib.sha256()
     for file in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(file.read_bytes())
+        text = file.read_bytes()
+        if b"@compiled" in text or file.name == "foot_filter_events.py":
+            digest.update(text)
     return str(Path(platformdirs.user_cache_dir("foottrack", appauthor=False)) / f"kernels-{digest.hexdigest()[:16]}")
 
 

@@ -19,7 +19,7 @@ from foottrack_service.fusion.ladder import BALL_68_OF_ONE_AXIS, Ladder
 from foottrack_service.fusion.pictures_only import PicturesOnlyFilter
 from foottrack_service.rotations import Array
 
-SYSTEMATIC = 0.0025
+SYSTEMATIC = 0.003
 """m per axis: what no amount of agreeing fixes takes away (lens, depth scale, head pose, where the tag is glued)."""
 
 _log = logging.getLogger(__name__)

@@ -243,6 +243,11 @@ class InertialFilter:
         return self._timeline.X[i], self._timeline.P[i]
 
     @property
+    def last_row(self) -> Array:
+        """The newest sample as the filter used it (foot_filter_events)."""
+        return self._last
+
+    @property
     def contact(self) -> bool:
         """Whether heel or toes stand."""
         return bool(self._lock[CONTACT])

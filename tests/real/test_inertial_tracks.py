@@ -1,0 +1,34 @@
+"""Real foot IMUs through our filter, inertial only, forward only, one configuration for all (data: see its README)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from inertial_recordings import DATA, gaitmap_strides, vicon_rmse, xio_end_error
+
+pytestmark = [
+    pytest.mark.real,
+    pytest.mark.skipif(not DATA.is_dir(), reason="the real recordings are not here (FOOTTRACK_DATA)"),
+]
+
+
+def test_walks_and_runs_against_motion_capture() -> None:
+    errors = [vicon_rmse(file) for file in sorted((DATA / "llio_pyshoe_vicon_dev").glob("*.npz"))]
+    assert len(errors) == 9
+    assert np.median(errors) < 0.08
+    assert max(errors) < 0.5
+
+
+@pytest.mark.parametrize(("walk", "plane"), [("short_walk", 0.06), ("long_walk", 0.36)])
+def test_walks_end_where_they_began(walk: str, plane: float) -> None:
+    # The gyro's own heading explains what is left of the long one: 0.45 % of a full turn.
+    in_plane, height = xio_end_error(walk)
+    assert in_plane < plane
+    assert abs(height) < 0.01
+
+
+def test_stride_lengths_against_the_heel() -> None:
+    errors, found = (np.concatenate(both) for both in zip(*map(gaitmap_strides, ("left", "right")), strict=True))
+    assert len(errors) == 57
+    assert found.all()
+    assert np.sqrt(np.mean(errors**2)) < 0.05
