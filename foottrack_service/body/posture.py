@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from foottrack_protocol.messages import Side
 from foottrack_service.body.skeleton import EYES_ABOVE_NECK, EYES_BEFORE_NECK, Skeleton
@@ -22,12 +22,13 @@ HIPS_BEFORE_ANKLES = 0.03
 # masses (Winter, table 4.1: head, arms and trunk 0.678 of the mass at 0.44 of the way from hips to eyes, thighs 0.2,
 # shanks 0.093) gives 0.38 and 0.1; people who squat sit further back than it demands.
 _BACK_PER_LEAN = 0.40
-_BACK_PER_CROUCH = 0.15
+_BACK_PER_CROUCH = 0.2
+_WALKING_DROP = 0.03
+"""m: so far the neck sinks in a step, or with a look down."""
 _ROUNDS = 4
 
 
-@dataclass(frozen=True, slots=True)
-class Facing:
+class Facing(NamedTuple):
     """Horizontal axes of a body with a yaw, and that turn as a quaternion."""
 
     forward: Vec
@@ -41,8 +42,7 @@ class Facing:
         return cls((-sine, 0.0, -cosine), (cosine, 0.0, -sine), (0.0, math.sin(0.5 * yaw), 0.0, math.cos(0.5 * yaw)))
 
 
-@dataclass(frozen=True, slots=True)
-class Hips:
+class Hips(NamedTuple):
     """Hips' centre [m], their rotation to the stage (they pitch with the trunk), and the hip joint of each foot [m]."""
 
     p: Vec
@@ -89,11 +89,13 @@ def place(hips: Vec, pitch: float, facing: Facing, ankles: Mapping[Side, Vec], b
 
 
 def _lean(top: Vec, facing: Facing, ankles: Mapping[Side, Vec], body: Skeleton, rise: float, ahead: float) -> float:
-    # Lean and crouch, m, from how far the neck is ahead and how far it is down.
-    (ax, ay, az), (bx, by, bz) = ankles.values()
+    # Lean and crouch, m, from how far the neck is ahead of the front foot and how far it is down. A step or a sway is
+    # neither: it moves the hips as well, and hardly lowers the neck.
     fx, _, fz = facing.forward
-    out = (top[0] - 0.5 * (ax + bx)) * fx + (top[2] - 0.5 * (az + bz)) * fz - HIPS_BEFORE_ANKLES - ahead
-    drop = min(ay, by) + REACH * (body.thigh + body.shank) + rise - top[1]
+    front = max(x * fx + z * fz for x, _, z in ankles.values())
+    lowest = min(y for _, y, _ in ankles.values())
+    out = top[0] * fx + top[2] * fz - front - HIPS_BEFORE_ANKLES - ahead
+    drop = lowest + REACH * (body.thigh + body.shank) + rise - top[1] - _WALKING_DROP
     if drop <= 0.0:
         return 0.0
     drop = min(drop, rise)

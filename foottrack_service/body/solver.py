@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from foottrack_protocol.messages import Side
 from foottrack_service.body import posture
@@ -18,16 +17,14 @@ from foottrack_service.body.whole_body import WholeBody
 Solver = Literal["two-bone", "fabrik"]
 
 
-@dataclass(frozen=True, slots=True)
-class FootPlace:
+class FootPlace(NamedTuple):
     """One ankle [m] and the foot's rotation to the stage."""
 
     p: Vec
     q: Quaternion
 
 
-@dataclass(frozen=True, slots=True)
-class Legs:
+class Legs(NamedTuple):
     """Hips (centre m, rotation to the stage), and hip joint and knee [m] of each foot that there is."""
 
     hips: Vec

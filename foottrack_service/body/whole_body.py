@@ -22,6 +22,9 @@ _TRUNK = (math.radians(30.0), math.radians(100.0), math.radians(35.0), math.radi
 _LUMBAR = (math.radians(45.0), math.radians(45.0), math.radians(25.0), math.radians(25.0))
 _HIP_FRONT, _HIP_BACK, _HIP_OUT, _HIP_IN = (math.radians(angle) for angle in (125.0, 40.0, 60.0, 40.0))
 _KNEE = math.radians(150.0)
+_TOLERANCE = 1e-3
+"""m: the legs are closed exactly afterwards."""
+_ITERATIONS = 12
 
 
 class WholeBody:
@@ -69,7 +72,7 @@ class WholeBody:
             limits[first + 1] = Cone(facing.forward, facing.right, (_HIP_FRONT, _HIP_BACK, *sides), _DOWN)
             limits[first + 2] = Hinge(_across(axis, unit(sub(ankle, joint), _DOWN), back), _KNEE)
             targets[first + 2] = ankle
-        found = self._tree.solve(points, targets, limits)
+        found = self._tree.solve(points, targets, limits, tolerance=_TOLERANCE, most_iterations=_ITERATIONS)
         return found.points[_HIPS], {side: found.points[first + 1] for side, first in self._legs.items()}
 
 
