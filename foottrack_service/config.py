@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -23,6 +24,7 @@ from foottrack_service.camera.settings import SourceSettings
 from foottrack_service.imu.settings import ImuSettings
 
 DEFAULT_FILE = Path("foottrack.toml")
+_log = logging.getLogger(__name__)
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
@@ -245,11 +247,24 @@ def load(
 
 
 def from_toml(text: str) -> Settings:
-    """Settings of a recording's attachment: the file alone, no environment. Raises ConfigError."""
+    """Settings of a recording's attachment: the file alone, no environment. Raises ConfigError.
+
+    A recording outlives a setting's name: keys that this version does not know are left out, with a warning.
+    """
     try:
-        return _validated(tomllib.loads(text), {})
+        values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"not TOML: {error}") from None
+    while True:
+        try:
+            return Settings(**values)
+        except ValidationError as error:
+            unknown = [item["loc"] for item in error.errors(include_url=False) if item["type"] == "extra_forbidden"]
+            if not unknown:
+                return _validated(values, {})
+            for place in unknown:
+                _log.warning("the recording's setting %s is not known to this version", ".".join(map(str, place)))
+                _remove(values, place)
 
 
 def to_toml(settings: Settings) -> str:
@@ -277,6 +292,12 @@ def _read(file: Path) -> dict[str, Any]:
         raise ConfigError(f"{file}: {error}") from None
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{file}: not TOML: {error}") from None
+
+
+def _remove(values: Any, place: Sequence[int | str]) -> None:
+    for key in place[:-1]:
+        values = values[key]
+    del values[place[-1]]
 
 
 def _merge(into: dict[str, Any], layer: Mapping[str, Any], name: str, prefix: str, origins: dict[str, str]) -> None:
