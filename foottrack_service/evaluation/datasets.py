@@ -1,13 +1,14 @@
 """Public recordings of foot-worn IMUs with a reference, read into the wire's frames. Their data is not part of this.
 
 ``gaitmap``: both feet, 204.8 Hz, motion capture of heels and toes. ``llio_pyshoe_vicon_dev``: one foot, 200 Hz, Vicon.
+``llio_corridor_dev``: one foot, 200 Hz, counted strides. ``quest_wip``: a headset's poses, 72 Hz.
 """
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -94,6 +95,34 @@ def pyshoe(file: Path) -> FootTrial:
     return FootTrial(
         f"pyshoe {file.stem}", "right", t, columns["acc"], columns["gyr"], _FORWARD_RIGHT_DOWN_TO_FOOT, t, true_xy
     )
+
+
+def corridor(file: Path) -> tuple[FootTrial, int]:
+    """One long walk with an IMU on one foot, and how many strides that foot took. Raises DatasetError."""
+    try:
+        with np.load(file) as data:
+            columns = {key: np.asarray(data[key], dtype=np.float64) for key in ("t", "acc", "gyr", "gcp_xy")}
+            marks = np.asarray(data["stride_idx"])
+    except (OSError, KeyError, ValueError) as error:
+        raise DatasetError(f"{file}: {error}") from None
+    t = columns["t"] - columns["t"][0]
+    name = f"corridor {file.stem.rpartition('_')[2]}"
+    trial = FootTrial(
+        name, "right", t, columns["acc"], columns["gyr"], _FORWARD_RIGHT_DOWN_TO_FOOT, t[marks], columns["gcp_xy"]
+    )
+    return trial, len(marks) - 1
+
+
+def levelled(trial: FootTrial, rest_s: float = 0.5) -> FootTrial:
+    """The same with the sensor's tilt on the shoe known from the stand at the start: a standing foot is level."""
+    rest = rot.rotate(trial.sensor_to_foot, trial.acc[trial.t < trial.t[0] + rest_s].mean(axis=0))
+    up = rest / np.linalg.norm(rest)
+    axis = np.cross(up, [0.0, 1.0, 0.0])
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-9:
+        return trial
+    turn = rot.from_axis_angle(axis / sine, np.arctan2(sine, up[1]))
+    return replace(trial, sensor_to_foot=rot.multiply(turn, trial.sensor_to_foot))
 
 
 def messages(trials: list[FootTrial], settings: Settings, start: int = 0) -> Iterator[tuple[int, Message]]:
