@@ -13,7 +13,7 @@ import numpy as np
 from foottrack_protocol.messages import Side
 from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings, Placement
-from foottrack_service.fusion.contact import STATISTIC, SeenMotion, stance_sigma
+from foottrack_service.fusion.contact import QUIET, STATISTIC, SeenMotion, stance_sigma
 from foottrack_service.fusion.foot_filter_candidates import Candidates, Rejected
 from foottrack_service.fusion.foot_filter_events import (
     ACCEPTED,
@@ -246,6 +246,11 @@ class InertialFilter:
     def last_row(self) -> Array:
         """The newest sample as the filter used it (foot_filter_events)."""
         return self._last
+
+    @property
+    def standing(self) -> bool:
+        """Whether the whole foot stands, quietly."""
+        return bool(self._last[ZERO_SIGMA] > 0.0 and self._memory[STATISTIC] < QUIET)
 
     @property
     def contact(self) -> bool:

@@ -1,0 +1,189 @@
+"""The camera's mount on the headset, estimated in use: a standing foot stays where it is while the head moves.
+
+Per stance the target's place in the stage is one unknown point c. A small turn f and shift t (head frame) that the
+configured mount lacks, and the depth's scale s, show as motion of what does not move:
+
+    head.p + R p = c - R t + R [p]x f - R p s         (p: the target in the head frame, R: the head's attitude)
+
+That is linear: weighted least squares over all stances, each point c eliminated at once (Schur complement). What was
+found is applied on top of the configured mount: p' = exp(f) p + t.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from foottrack_protocol.messages import Side
+from foottrack_service import rotations as rot
+from foottrack_service.fusion.foot_filter_optical import implausible
+from foottrack_service.fusion.interface import OpticalFix
+from foottrack_service.rotations import Array
+
+PRIOR = np.array([0.03] * 3 + [0.02] * 3 + [0.005])
+"""rad, m, 1: how wrong mounts and depth scales are at most, SD."""
+HEAD_NOISE, HEAD_TURN_NOISE = 0.001, 0.0008
+"""m, and rad times the distance: what the head pose adds."""
+CORRELATED = 2.5
+"""So many neighbouring pictures say the same: lens, head pose and corners err together."""
+OUTLIER = 16.3
+"""Chi-square, 3 degrees of freedom."""
+MISFIT = 1.0
+"""A stance that fits no mount was none, or was another shoe's."""
+LEAST_OF_STANCE = 12
+LONGEST_STANCE_S = 3.0
+"""A longer one is cut: a person who stands shifts the feet a little."""
+RECENT_S = 15.0
+SLIP_TURN, SLIP_SHIFT = math.radians(0.3), 0.005
+"""rad, m: a mount that has moved by less has not slipped."""
+SLIP_SIGMAS = 4.0
+SLIP_STANCES = 3
+"""So many stances in a row must say so."""
+GOOD_TURN, GOOD_SHIFT = math.radians(0.1), 0.002
+"""rad, m per axis SD: what a correction must reach to be used."""
+
+
+@dataclass(frozen=True, slots=True)
+class MountEstimate:
+    """A correction of the mount, head frame: apply ``q``, then add ``p``."""
+
+    p: Array
+    """m."""
+    q: Array
+    sigma_p: float
+    """m per axis."""
+    sigma_q: float
+    """rad per axis."""
+
+    @property
+    def good(self) -> bool:
+        """Whether it is known well enough to be applied."""
+        return self.sigma_p <= GOOD_SHIFT and self.sigma_q <= GOOD_TURN
+
+
+@dataclass(slots=True)
+class _Stance:
+    """Sums over one stance: of W, J' W J, J' W, J' W z, W z and z' W z (``square``)."""
+
+    begun: int
+    ended: int
+    n: int
+    W: Array
+    JWJ: Array
+    JW: Array
+    JWz: Array
+    Wz: Array
+    square: float
+
+    def information(self) -> tuple[Array, Array]:
+        """What it says of the 7 unknowns with its own point eliminated: matrix (7, 7) and vector (7,)."""
+        inverse = _inverse(self.W)
+        return self.JWJ - self.JW @ inverse @ self.JW.T, self.JWz - self.JW @ inverse @ self.Wz
+
+    def misfit(self, matrix: Array, vector: Array) -> float:
+        """What no mount explains, per component: about 1 / CORRELATED for a foot that stood."""
+        values, _ = _solved(matrix, vector)
+        explained = self.Wz @ np.linalg.solve(self.W, self.Wz) + vector @ values
+        return float(self.square - explained) / (3.0 * self.n)
+
+
+class MountCalibrator:
+    """Takes fixes of standing feet as the *configured* mount gave them, and tells what that mount lacks."""
+
+    def __init__(self) -> None:
+        self._open: dict[Side, _Stance] = {}
+        self._matrix, self._vector = np.zeros((7, 7)), np.zeros(7)
+        self._recent: deque[tuple[int, Array, Array]] = deque()
+        self._slipping = 0
+        self.slips = 0
+        """How often the mount was seen to have moved."""
+
+    def add(self, side: Side, fix: OpticalFix, standing: bool) -> None:
+        """A fix of one foot, in order, and whether that foot stands flat. Other kinds than "marker" are left out."""
+        if fix.kind != "marker" or implausible(fix) is not None:
+            return
+        stance = self._open.get(side)
+        if stance is not None and (not standing or (fix.t - stance.begun) * 1e-9 > LONGEST_STANCE_S):
+            self._close(side)
+            stance = None
+        if not standing:
+            return
+        R = rot.to_matrix(fix.head.q)
+        z = fix.head.p + R @ fix.p
+        x, y, w = fix.p
+        cross = np.array([[0.0, -w, y], [w, 0.0, -x], [-y, x, 0.0]])
+        J = np.hstack([R @ cross, -R, -(R @ fix.p)[:, None]])
+        noise = HEAD_NOISE**2 + HEAD_TURN_NOISE**2 * float(fix.p @ fix.p)
+        W = _inverse(R @ fix.cov @ R.T + noise * np.eye(3)) / CORRELATED
+        if stance is None:
+            self._open[side] = _Stance(fix.t, fix.t, 1, W, J.T @ W @ J, J.T @ W, J.T @ W @ z, W @ z, float(z @ W @ z))
+            return
+        if stance.n >= LEAST_OF_STANCE and self._surprise(stance, J, W, z) > OUTLIER:
+            return
+        stance.n, stance.ended = stance.n + 1, fix.t
+        stance.W += W
+        stance.JWJ += J.T @ W @ J
+        stance.JW += J.T @ W
+        stance.JWz += J.T @ W @ z
+        stance.Wz += W @ z
+        stance.square += float(z @ W @ z)
+
+    def estimate(self) -> MountEstimate | None:
+        """What is known so far, None before the first stance is over."""
+        if not self._matrix.any():
+            return None
+        values, covariance = _solved(self._matrix, self._vector)
+        sd = np.sqrt(np.diag(covariance))
+        return MountEstimate(
+            values[3:6], rot.from_rotation_vector(values[:3]), float(sd[3:6].max()), float(sd[:3].max())
+        )
+
+    def _close(self, side: Side) -> None:
+        stance = self._open.pop(side)
+        if stance.n < LEAST_OF_STANCE:
+            return
+        matrix, vector = stance.information()
+        if stance.misfit(matrix, vector) > MISFIT:
+            return
+        self._recent.append((stance.ended, matrix, vector))
+        while (stance.ended - self._recent[0][0]) * 1e-9 > RECENT_S:
+            self._recent.popleft()
+        self._matrix += matrix
+        self._vector += vector
+        self._notice_a_slip()
+
+    def _notice_a_slip(self) -> None:
+        recent_matrix = np.sum([r[1] for r in self._recent], axis=0)
+        recent_vector = np.sum([r[2] for r in self._recent], axis=0)
+        old_matrix, old_vector = self._matrix - recent_matrix, self._vector - recent_vector
+        old, old_covariance = _solved(old_matrix, old_vector)
+        new, new_covariance = _solved(recent_matrix, recent_vector)
+        gap, sd = np.abs(new - old)[:6], np.sqrt(np.diag(old_covariance + new_covariance))[:6]
+        least = np.array([SLIP_TURN] * 3 + [SLIP_SHIFT] * 3)
+        slipped = len(self._recent) >= SLIP_STANCES and bool(((gap > SLIP_SIGMAS * sd) & (gap > least)).any())
+        self._slipping = self._slipping + 1 if slipped else 0
+        if self._slipping >= SLIP_STANCES:
+            self.slips += 1
+            self._slipping = 0
+            self._matrix, self._vector = np.zeros((7, 7)), np.zeros(7)
+            self._recent.clear()
+
+    def _surprise(self, stance: _Stance, J: Array, W: Array, z: Array) -> float:
+        values, _ = _solved(self._matrix, self._vector)
+        point = np.linalg.solve(stance.W, stance.Wz - stance.JW.T @ values)
+        off = z - J @ values - point
+        # A mount that is not known yet moves what stands still: that is no outlier.
+        slack = CORRELATED * W if self._matrix.any() else W / CORRELATED
+        return float(off @ slack @ off) / 4.0
+
+
+def _solved(matrix: Array, vector: Array) -> tuple[Array, Array]:
+    covariance = _inverse(matrix + np.diag(1.0 / PRIOR**2))
+    return covariance @ vector, covariance
+
+
+def _inverse(matrix: Array) -> Array:
+    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
