@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from foottrack_service.body.limits import Limit, Rigid
+from foottrack_service.body.limits import Limit
 from foottrack_service.body.vectors import Vec, along, norm, sub, unit
 
 _STALLED = 1e-3
@@ -98,11 +98,9 @@ class Fabrik:
                     continue  # a branch without an end effector follows on the way out
                 here = (x / count, y / count, z / count)
             points[index] = here
+            bone = unit(sub(here, points[parent]), _ANYWHERE)
             limit = limits.get(index)
-            if isinstance(limit, Rigid):
-                wx, wy, wz = along(here, limit.direction, -length)
-            else:
-                wx, wy, wz = along(here, unit(sub(points[parent], here), _ANYWHERE), length)
+            wx, wy, wz = along(here, bone if limit is None else limit.alone(bone), -length)
             x, y, z, count = wishes[parent]
             wishes[parent] = (x + wx, y + wy, z + wz, count + 1)
 

@@ -19,6 +19,9 @@ class Limit(Protocol):
     def __call__(self, before: Vec, bone: Vec) -> Vec:
         """The allowed direction."""
 
+    def alone(self, bone: Vec) -> Vec:
+        """The same as far as it can be told without the bone before."""
+
 
 @dataclass(frozen=True, slots=True)
 class Rigid:
@@ -27,6 +30,10 @@ class Rigid:
     direction: Vec
 
     def __call__(self, before: Vec, bone: Vec) -> Vec:
+        """Always the same."""
+        return self.direction
+
+    def alone(self, bone: Vec) -> Vec:
         """Always the same."""
         return self.direction
 
@@ -62,6 +69,10 @@ class Cone:
             return bone
         return along(_scaled(axis, math.cos(most)), out, math.sin(most))
 
+    def alone(self, bone: Vec) -> Vec:
+        """Anything."""
+        return bone
+
 
 @dataclass(frozen=True, slots=True)
 class Hinge:
@@ -76,10 +87,14 @@ class Hinge:
         back = cross(straight, self.axis)
         flexed = math.atan2(dot(bone, back), dot(bone, straight))
         # Bent too far and bent the wrong way meet at the back: the nearer end counts.
-        if flexed < 0.5 * (self.most - 2.0 * math.pi):
+        if flexed < 0.5 * self.most - math.pi:
             flexed = self.most
         flexed = min(max(flexed, 0.0), self.most)
         return along(_scaled(straight, math.cos(flexed)), back, math.sin(flexed))
+
+    def alone(self, bone: Vec) -> Vec:
+        """Laid into the hinge's plane."""
+        return unit(without(bone, self.axis), bone)
 
 
 def _scaled(a: Vec, by: float) -> Vec:

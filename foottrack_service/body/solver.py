@@ -68,11 +68,12 @@ class BodySolver:
         axes = {side: knee_axis(facing.right, facing.forward, foot.q) for side, foot in feet.items()}
         top = posture.neck(head_p, head_q)
         centre, pitch = posture.hips_below(top, facing, ankles, body)
+        hips = posture.place(centre, pitch, facing, ankles, body)
         if self._solver == "fabrik" and feet:
             x, y, z = head_p
-            centre = self._tree(tuple(feet)).solve((x, y, z), top, centre, facing, ankles, axes)[0]
-        # Whatever the trunk wants, the legs decide last: the knees close the triangles exactly.
-        hips = posture.place(centre, pitch, facing, ankles, body)
+            centre = self._tree(tuple(feet)).solve((x, y, z), top, hips.p, facing, ankles, axes)
+            # Where trunk and legs cannot both have their lengths, the legs have them.
+            hips = posture.place(centre, pitch, facing, ankles, body)
         knees = {side: knee(hips.joints[side], ankles[side], axes[side], facing.forward, body) for side in ankles}
         return Legs(hips.p, hips.q, hips.joints, knees)
 

@@ -9,7 +9,7 @@ from foottrack_protocol.messages import Side
 from foottrack_service.body.fabrik import Fabrik, Joint
 from foottrack_service.body.legs import knee
 from foottrack_service.body.limits import Cone, Hinge, Limit, Rigid
-from foottrack_service.body.posture import Facing
+from foottrack_service.body.posture import REACH, Facing
 from foottrack_service.body.skeleton import EYES_ABOVE_NECK, EYES_BEFORE_NECK, Skeleton
 from foottrack_service.body.vectors import Vec, along, cross, norm, sub, unit
 
@@ -42,17 +42,21 @@ class WholeBody:
         self._legs: dict[Side, int] = {}
         for side in sides:
             first = self._legs[side] = len(joints)
-            joints += [Joint(_HIPS, 0.5 * body.hip_width), Joint(first, body.thigh), Joint(first + 1, body.shank)]
+            # Stretched, these legs are as long as a leg may be used.
+            thigh, shank = REACH * body.thigh, REACH * body.shank
+            joints += [Joint(_HIPS, 0.5 * body.hip_width), Joint(first, thigh), Joint(first + 1, shank)]
         self._body = body
+        self._trunk = 2.0 * bone
         self._tree = Fabrik(joints)
 
     def solve(
         self, head: Vec, top: Vec, hips: Vec, facing: Facing, ankles: Mapping[Side, Vec], axes: Mapping[Side, Vec]
-    ) -> tuple[Vec, dict[Side, Vec]]:
-        """Hips' centre and the knees, m, from head, neck and ankles, beginning with ``hips`` as posture has them.
+    ) -> Vec:
+        """Hips' centre, m, from head, neck and ankles, beginning with ``hips`` as legs would have them.
 
         ``axes``: about which each knee bends (unit, to the right).
         """
+        hips = along(top, unit(sub(hips, top), _DOWN), self._trunk)
         points = [head, top, _between(top, hips), hips]
         back: Vec = (-facing.forward[0], 0.0, -facing.forward[2])
         # A bone that points down has its front where the body has it.
@@ -73,7 +77,7 @@ class WholeBody:
             limits[first + 2] = Hinge(_across(axis, unit(sub(ankle, joint), _DOWN), back), _KNEE)
             targets[first + 2] = ankle
         found = self._tree.solve(points, targets, limits, tolerance=_TOLERANCE, most_iterations=_ITERATIONS)
-        return found.points[_HIPS], {side: found.points[first + 1] for side, first in self._legs.items()}
+        return found.points[_HIPS]
 
 
 def _across(axis: Vec, leg: Vec, back: Vec) -> Vec:
