@@ -1,7 +1,7 @@
 """Our filter of one foot: its IMU with the fixes that correct it, and pictures alone where there is no IMU.
 
-Both run on the same fixes. What leaves is the inertial one while the IMU lives, else the pictures' one, with the stage
-and an honest radius.
+The fixes go to the inertial one while the IMU lives, else to the pictures' one, and so does the question where the
+foot is.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from foottrack_service.fusion.foot_filter_inertial import InertialFilter
 from foottrack_service.fusion.interface import FootEstimate, ImuSample, OpticalFix, Verdict
 from foottrack_service.fusion.ladder import BALL_68_OF_ONE_AXIS, Ladder
 from foottrack_service.fusion.pictures_only import PicturesOnlyFilter
-from foottrack_service.rotations import Array
+from foottrack_service.rotations import IDENTITY, Array
 
 SYSTEMATIC = 0.003
 """m per axis: what no amount of agreeing fixes takes away (lens, depth scale, head pose, where the tag is glued)."""
@@ -46,10 +46,11 @@ class ErrorStateFilter:
         if fix.kind == "depth" and self._ladder.fix_within("marker", fix.t):
             self._inertial.learn_blob(fix)
             return Verdict.UNUSED
-        seen = self._pictures.on_fix(fix)
-        verdict = self._inertial.on_fix(fix)
-        if verdict is Verdict.UNUSED:
-            verdict = seen
+        if self._inertial.begun and self._ladder.imu_alive(now):
+            self._pictures.lose()
+            verdict = self._inertial.on_fix(fix)
+        else:
+            verdict = self._pictures.on_fix(fix)
         if verdict is Verdict.ACCEPTED:
             self._ladder.saw_fix(fix.kind, fix.t)
         return verdict
@@ -93,7 +94,11 @@ def warm_up() -> None:
     """Compile the kernels, or read them from the cache, before the first sample needs them, and say so."""
     _log.info("loading the foot filter (the first start on a machine compiles it: about half a minute)")
     trial = ErrorStateFilter(FootSettings(), "left")
-    for i in range(12):
-        trial.on_imu(ImuSample(i * 2_500_000, np.array([0.0, 9.80665, 0.0]), np.zeros(3), None))
-    trial.estimate(30_000_000)
+    step = 5_000_000
+    for i in range(40):
+        trial.on_imu(ImuSample(i * step, np.array([0.0, 9.80665, 0.0]), np.zeros(3), None))
+        head = HeadSample(i * step, np.array([0.0, 1.6, 0.0]), IDENTITY)
+        p, q = np.array([-0.1, -1.55, -0.15]), np.array(FootSettings().marker.q)
+        trial.on_fix(OpticalFix(head.t, "marker", p, q, None, 1e-6 * np.eye(3), 1.0, 50.0, head, head), head.t)
+    trial.estimate(40 * step)
     _log.info("the foot filter is ready")

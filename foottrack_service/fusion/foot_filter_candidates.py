@@ -8,6 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from foottrack_service import rotations as rot
+from foottrack_service.fusion.foot_filter_events import (
+    ARM,
+    KIND,
+    MEASURED_Q,
+    POINT,
+    POINT_SIGMA,
+    RESET,
+    SPEED,
+    SPEED_SIGMA,
+    TURN_SIGMA,
+    YAW_SIGMA,
+)
 from foottrack_service.rotations import Array
 
 
@@ -40,6 +53,8 @@ TURN_SLACK = 0.35
 """rad."""
 DRIFT = 0.5
 """m/s: so fast a foot that was sure may have gone wrong; what is further away is another thing."""
+TAG_YAW_SIGMA, HEAD_YAW_SIGMA = 0.1, 0.6
+"""rad: how well a tag's attitude, and the head's, tell where the toes point."""
 SAME_TURN = 0.12
 """rad: a tag that lies on the shoe as ours does is most likely ours, however sure the foot is of its place."""
 
@@ -90,6 +105,29 @@ class Candidates:
             if _on_a_line(trial, fastest, turn_slack):
                 found = trial
         return found
+
+
+def fill_reset(row: Array, agreed: list[Rejected], q: Array, toes: float | None) -> bool:
+    """Write the event that starts place, speed and yaw anew at the oldest of the fixes that agree into ``row``.
+
+    ``q`` is the sensor's attitude there; without a tag's attitude it is turned by ``toes``, rad, or kept (None).
+    Returns whether a tag gave the yaw.
+    """
+    first, last = agreed[0], agreed[-1]
+    span = (last.t - first.t) * 1e-9
+    row[KIND] = RESET
+    row[POINT : POINT + 3] = first.point
+    row[ARM : ARM + 3] = first.arm
+    row[SPEED : SPEED + 3] = (last.point - first.point) / span
+    row[POINT_SIGMA] = 0.03
+    row[SPEED_SIGMA] = 0.5 + 3.0 * first.sigma / span
+    turns = [k.turn for k in agreed if k.turn is not None]
+    turn = turns[len(turns) // 2] if turns else toes
+    if turn is not None:
+        row[MEASURED_Q : MEASURED_Q + 4] = rot.multiply(rot.from_yaw(turn), q)
+        row[TURN_SIGMA] = 1.0
+        row[YAW_SIGMA] = TAG_YAW_SIGMA if turns else HEAD_YAW_SIGMA
+    return bool(turns)
 
 
 def _on_a_line(kept: list[Rejected], fastest: float, turn_slack: float) -> bool:

@@ -14,7 +14,7 @@ from foottrack_protocol.messages import Side
 from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings, Placement
 from foottrack_service.fusion.contact import QUIET, STATISTIC, SeenMotion, stance_sigma
-from foottrack_service.fusion.foot_filter_candidates import Candidates, Rejected
+from foottrack_service.fusion.foot_filter_candidates import Candidates, Rejected, fill_reset
 from foottrack_service.fusion.foot_filter_events import (
     ACCEPTED,
     ARM,
@@ -27,13 +27,8 @@ from foottrack_service.fusion.foot_filter_events import (
     MEASURED_Q,
     POINT,
     POINT_COV,
-    POINT_SIGMA,
     QUIET_FLAG,
-    RESET,
-    SPEED,
-    SPEED_SIGMA,
     TURN_SIGMA,
-    YAW_SIGMA,
     ZERO_SIGMA,
 )
 from foottrack_service.fusion.foot_filter_kernel import NE
@@ -75,7 +70,7 @@ SURE_SIGMA = 0.03
 
 
 class InertialFilter:
-    """One foot's IMU and the fixes that correct it. Times in ns, vectors in the stage."""
+    """One foot's IMU and the fixes that correct it. Times in ns (``newest`` is the last sample's), stage vectors."""
 
     def __init__(self, foot: FootSettings, side: Side, *, floor: bool) -> None:
         self._foot, self._side, self._use_floor = foot, side, floor
@@ -83,7 +78,7 @@ class InertialFilter:
         self._timeline, self._smallest = Timeline(), smallest_variances()
         self._samples = SampleRows()
         self._last: Array = np.zeros(COLUMNS)
-        self._imu_t, self._behind = 0, 0
+        self.newest, self._behind = 0, 0
         self._memory, self._lock = np.zeros(3), np.zeros(9)
         self._imu_yaw: float | None = None
         self._seen_yaw = False
@@ -122,13 +117,13 @@ class InertialFilter:
         if timeline.n == 0:
             self._begin(sample)
             return
-        if sample.t <= self._imu_t:
+        if sample.t <= self.newest:
             self._behind += 1
             if self._behind < JUMPED_AFTER:
                 return
             self._jump_to(sample.t)
         self._behind = 0
-        dt = (sample.t - self._imu_t) * 1e-9
+        dt = (sample.t - self.newest) * 1e-9
         if dt > UNSURE_AFTER_S:
             self.acquired = False
         i = timeline.place(sample.t)
@@ -143,7 +138,7 @@ class InertialFilter:
         row[FLOOR] = self._floor + self._foot.ankle_height if self._use_floor else math.nan
         self._replay(i)
         follow(self._lock, row, timeline.X[timeline.n - 1], self._toe_arm, min(dt, HOLE_S))
-        self._imu_t, self._last = sample.t, row.copy()
+        self.newest, self._last = sample.t, row.copy()
 
     def on_fix(self, fix: OpticalFix) -> Verdict:
         """Take a fix where it belongs."""
@@ -151,9 +146,9 @@ class InertialFilter:
         if reason is not None:
             return reason
         timeline = self._timeline
-        if timeline.n == 0 or fix.t > self._imu_t + FIX_MEMORY_S * 1e9:
+        if timeline.n == 0 or fix.t > self.newest + FIX_MEMORY_S * 1e9:
             return Verdict.UNUSED
-        if fix.t < self._imu_t - OLDEST_S * 1e9:
+        if fix.t < self.newest - OLDEST_S * 1e9:
             return Verdict.STALE
         delay = float(np.clip(timeline.X[timeline.n - 1, 16], -0.05, 0.05))
         t = fix.t + round(delay * 1e9)
@@ -191,7 +186,7 @@ class InertialFilter:
 
     def learn_blob(self, fix: OpticalFix) -> None:
         """A depth blob that is not needed, since the tag is seen, shows where on the shoe blobs lie."""
-        if implausible(fix) is None and self.begun and self.acquired and fix.t <= self._imu_t:
+        if implausible(fix) is None and self.begun and self.acquired and fix.t <= self.newest:
             ankle, q, _, sd = self.predicted(fix.t)
             if sd < SURE_SIGMA:
                 self._blob.learn(ankle, q, fix.head.p + rot.rotate(fix.head.q, fix.p))
@@ -230,11 +225,6 @@ class InertialFilter:
     def begun(self) -> bool:
         """Whether there was a sample."""
         return self._timeline.n > 0
-
-    @property
-    def newest(self) -> int:
-        """Stamp of the newest sample, ns."""
-        return self._imu_t
 
     @property
     def state(self) -> tuple[Array, Array]:
@@ -280,7 +270,7 @@ class InertialFilter:
         ankle = np.array([FEET_APART[self._side], self._floor + self._foot.ankle_height, 0.0])
         x, P = first_state(q, ankle - rot.rotate(q, self._geometry[ANKLE_ARM : ANKLE_ARM + 3]), sample)
         timeline.X[i], timeline.P[i] = x, P
-        self._imu_t, self._last = sample.t, timeline.rows[i].copy()
+        self.newest, self._last = sample.t, timeline.rows[i].copy()
 
     def _replay(self, start: int) -> None:
         timeline = self._timeline
@@ -324,45 +314,31 @@ class InertialFilter:
     def _restart_from(self, agreed: list[Rejected], fix: OpticalFix) -> None:
         """Begin anew at the oldest of the fixes that agree, and take them all."""
         timeline = self._timeline
-        first, last = agreed[0], agreed[-1]
-        i = timeline.insert(first.t - 1)
+        i = timeline.insert(agreed[0].t - 1)
         if i == 0:
             self._replay(1)
             return
-        row = timeline.rows[i]
-        row[KIND] = RESET
-        row[POINT : POINT + 3] = first.point
-        span = (last.t - first.t) * 1e-9
-        row[ARM : ARM + 3] = first.arm
-        row[SPEED : SPEED + 3] = (last.point - first.point) / span
-        row[POINT_SIGMA] = 0.03
-        row[SPEED_SIGMA] = 0.5 + 3.0 * first.sigma / span
+        q = timeline.X[i - 1, 6:10]
+        toes = None
+        if not self._seen_yaw:
+            # Without a tag's attitude the toes point mostly where the head looks.
+            foot_q = rot.multiply(q, rot.conjugate(self._imu_q))
+            toes = float(rot.yaw_of(fix.head.q) - rot.yaw_of(foot_q))
+        self._seen_yaw |= fill_reset(timeline.rows[i], agreed, q, toes)
         chosen = {k.t for k in agreed}
-        turns = [k.turn for k in agreed if k.turn is not None]
-        x = timeline.X[i - 1]
-        if turns:
-            row[MEASURED_Q : MEASURED_Q + 4] = rot.multiply(rot.from_yaw(turns[len(turns) // 2]), x[6:10])
-            row[TURN_SIGMA], row[YAW_SIGMA] = 1.0, 0.1
-            self._seen_yaw = True
-        elif not self._seen_yaw:
-            # Nothing says where the toes point: mostly where the head looks.
-            foot_q = rot.multiply(x[6:10], rot.conjugate(self._imu_q))
-            turn = float(rot.yaw_of(fix.head.q) - rot.yaw_of(foot_q))
-            row[MEASURED_Q : MEASURED_Q + 4] = rot.multiply(rot.from_yaw(turn), x[6:10])
-            row[TURN_SIGMA], row[YAW_SIGMA] = 1.0, 0.6
         for j in range(i, timeline.n):
             if timeline.rows[j, KIND] == FIX and int(timeline.t[j]) in chosen:
                 timeline.rows[j, ACCEPTED] = 1.0
         self._replay(i)
         self.acquired = True
-        self._fix_t[fix.kind] = last.t
+        self._fix_t[fix.kind] = agreed[-1].t
         self._motion.clear()
         self._lock[:] = 0.0
 
     def _jump_to(self, t: int) -> None:
         """The device's clock was set back: go on from there, unsure."""
         self._timeline.restart(t - 1)
-        self._imu_t = t - 1
+        self.newest = t - 1
         self._timeline.P[0, range(3), range(3)] += 0.1**2
         self._timeline.P[0, range(3, 6), range(3, 6)] += 1.0
         self._memory[:] = 0.0

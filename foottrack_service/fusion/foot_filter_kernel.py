@@ -70,6 +70,17 @@ def turned(R: Array, v: Array) -> Array:
 
 
 @compiled
+def product(a: Array, b: Array) -> Array:
+    """Hamilton product of two quaternions, shape (4,): first b turns, then a."""
+    out = np.empty(4)
+    out[0] = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1]
+    out[1] = a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0]
+    out[2] = a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3]
+    out[3] = a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]
+    return out
+
+
+@compiled
 def turn_body(q: Array, rx: float, ry: float, rz: float) -> None:
     """q <- q exp(r), r a rotation vector in the body's frame, in place; the result is unit."""
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)

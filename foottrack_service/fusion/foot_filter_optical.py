@@ -18,7 +18,7 @@ from foottrack_service.fusion.foot_filter_events import (
     POINT_COV,
     TURN_SIGMA,
 )
-from foottrack_service.fusion.foot_filter_kernel import NE, invert3
+from foottrack_service.fusion.foot_filter_kernel import NE, invert3, product, rotation
 from foottrack_service.fusion.foot_filter_replay import attitude_error, point_model
 from foottrack_service.fusion.interface import OpticalFix, Verdict
 from foottrack_service.rotations import Array
@@ -51,8 +51,9 @@ BLOB_CORRELATED = 20.0
 
 def implausible(fix: OpticalFix) -> Verdict | None:
     """Why a fix is not looked at any further; None when it may be good."""
-    numbers = [*fix.p, *fix.cov.ravel(), *fix.head.p, *fix.head.q]
-    if not all(map(math.isfinite, numbers)) or min(fix.cov[0, 0], fix.cov[1, 1], fix.cov[2, 2]) < 0.0:
+    # A sum is finite only where all its parts are.
+    total = float(fix.p.sum() + fix.cov.sum() + fix.head.p.sum() + fix.head.q.sum())
+    if not math.isfinite(total) or min(fix.cov[0, 0], fix.cov[1, 1], fix.cov[2, 2]) < 0.0:
         return Verdict.INVALID
     if fix.edge_px < LEAST_EDGE_PX:
         return Verdict.BORDER
@@ -87,13 +88,15 @@ class FixRows:
 
     def __init__(self, foot: FootSettings, imu_p: Array, imu_q: Array, blob: Blob) -> None:
         self._target_to_sensor = rot.multiply(rot.conjugate(imu_q), np.array(foot.marker.q))
+        self._sensor_to_target = rot.conjugate(self._target_to_sensor)
         self._arm = rot.unrotate(imu_q, np.array(foot.marker.p) - imu_p)
         self._imu_p, self._imu_q = imu_p, imu_q
         self._blob = blob
 
     def fill(self, row: Array, fix: OpticalFix, delay: float) -> list[Array]:
         """Write place and noise into ``row``; returns the sensor's attitudes that the tag allows, best first."""
-        matrix = rot.to_matrix(fix.head.q)
+        matrix = np.empty((3, 3))
+        rotation(fix.head.q, matrix)
         row[POINT : POINT + 3] = fix.head.p + matrix @ fix.p
         distance2 = float(fix.p @ fix.p)
         noise = HEAD_NOISE**2 + HEAD_TURN_NOISE**2 * distance2
@@ -105,9 +108,9 @@ class FixRows:
         row[PLACED_DELAY] = delay
         found = []
         for q in (fix.q, fix.q_alt):
-            if q is not None and np.isfinite(q).all() and np.any(q != 0.0):
-                target = rot.multiply(fix.head.q, rot.normalised(q))
-                found.append(rot.multiply(target, rot.conjugate(self._target_to_sensor)))
+            norm = 0.0 if q is None else math.sqrt(float(q @ q))
+            if q is not None and math.isfinite(norm) and norm > 0.0:
+                found.append(product(product(fix.head.q, q / norm), self._sensor_to_target))
         return found
 
     def take_attitude(self, row: Array, fix: OpticalFix, attitudes: list[Array], x: Array) -> bool:
@@ -127,8 +130,9 @@ class FixRows:
         if leans[best] <= TILT_USABLE:
             q = attitudes[best]
             row[MEASURED_Q : MEASURED_Q + 4] = q
-            normal = rot.rotate(rot.multiply(q, self._target_to_sensor), np.array([0.0, 0.0, 1.0]))
-            row[NORMAL : NORMAL + 3] = normal
+            target = np.empty((3, 3))
+            rotation(product(q, self._target_to_sensor), target)
+            row[NORMAL : NORMAL + 3] = target[:, 2]
             across = math.sqrt(max(0.0, float(np.linalg.eigvalsh(fix.cov)[0])))
             row[TURN_SIGMA] = math.hypot(LEAST_TURN_SIGMA, TURN_PER_METRE * across)
         return True

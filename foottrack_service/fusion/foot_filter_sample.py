@@ -27,8 +27,12 @@ def usable(sample: ImuSample) -> bool:
     """Whether all numbers are finite and there is a rate or an attitude."""
     if sample.gyro is None and sample.q is None:
         return False
-    given = [*sample.acc, *([] if sample.gyro is None else sample.gyro), *([] if sample.q is None else sample.q)]
-    return all(map(math.isfinite, given)) and (sample.q is None or bool(np.any(sample.q != 0.0)))
+    # A sum of squares is finite only where all its parts are.
+    total = float(sample.acc @ sample.acc)
+    if sample.gyro is not None:
+        total += float(sample.gyro @ sample.gyro)
+    size = 1.0 if sample.q is None else float(sample.q @ sample.q)
+    return math.isfinite(total + size) and size > 0.0
 
 
 def upright(sample: ImuSample) -> Array | None:
