@@ -14,7 +14,7 @@ import numpy as np
 from foottrack_protocol.messages import Side
 from foottrack_service.config import FootSettings, Placement
 from foottrack_service.fusion.foot_filter_inertial import InertialFilter
-from foottrack_service.fusion.interface import FootEstimate, ImuSample, OpticalFix, Verdict
+from foottrack_service.fusion.interface import FootEstimate, HeadSample, ImuSample, OpticalFix, Verdict
 from foottrack_service.fusion.ladder import BALL_68_OF_ONE_AXIS, Ladder
 from foottrack_service.fusion.pictures_only import PicturesOnlyFilter
 from foottrack_service.rotations import IDENTITY, Array
