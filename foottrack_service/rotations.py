@@ -8,6 +8,7 @@ floats for one quaternion, which is ten times as fast. Tested against ``scipy.sp
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,12 @@ IDENTITY: Array = np.array([0.0, 0.0, 0.0, 1.0])
 def normalised(q: npt.ArrayLike) -> Array:
     """Unit quaternion(s), shape (..., 4). Raises ValueError where one is zero or not finite."""
     q = np.asarray(q, dtype=np.float64)
+    if q.ndim == 1:
+        x, y, z, w = q.tolist()
+        length = math.sqrt(x * x + y * y + z * z + w * w)
+        if not 0.0 < length < math.inf:
+            raise ValueError("a quaternion is zero or not finite")
+        return np.array((x / length, y / length, z / length, w / length))
     norm = np.linalg.norm(q, axis=-1, keepdims=True)
     if not np.all(np.isfinite(norm)) or np.any(norm == 0.0):
         raise ValueError("a quaternion is zero or not finite")
@@ -71,6 +78,8 @@ def from_rotation_vector(rotvec: npt.ArrayLike) -> Array:
 def to_rotation_vector(q: npt.ArrayLike) -> Array:
     """Logarithm: quaternion(s), shape (..., 4), to axis times angle in rad in [0, pi], shape (..., 3)."""
     q = np.asarray(q, dtype=np.float64)
+    if q.ndim == 1:
+        return _logarithm(*q.tolist())
     q = np.where(q[..., 3:] < 0.0, -q, q)
     sine = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(sine, q[..., 3:])
@@ -149,6 +158,14 @@ def continuous(q: npt.ArrayLike) -> Array:
     signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))
     q[1:] *= signs[:, None]
     return q
+
+
+def _logarithm(x: float, y: float, z: float, w: float) -> Array:
+    if w < 0.0:
+        x, y, z, w = -x, -y, -z, -w
+    sine = math.sqrt(x * x + y * y + z * z)
+    scale = 2.0 if sine < 1e-12 else 2.0 * math.atan2(sine, w) / sine
+    return np.array((x * scale, y * scale, z * scale))
 
 
 def _product(ax: Any, ay: Any, az: Any, aw: Any, bx: Any, by: Any, bz: Any, bw: Any) -> tuple[Any, ...]:

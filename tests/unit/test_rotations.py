@@ -68,3 +68,12 @@ def test_continuous_tracks_never_jump():
 def test_normalising_refuses_what_is_no_rotation(bad):
     with pytest.raises(ValueError, match="zero or not finite"):
         rot.normalised(bad)
+
+
+@given(quaternions, quaternions, vectors)
+def test_one_and_many_give_the_same(a, b, v):
+    a, b = rot.normalised(a), rot.normalised(b)
+    assert np.allclose(rot.normalised(a[None])[0], a, rtol=0, atol=1e-15)
+    assert np.allclose(rot.multiply(a[None], b)[0], rot.multiply(a, b), rtol=0, atol=1e-15)
+    assert np.allclose(rot.rotate(a[None], v)[0], rot.rotate(a, v), rtol=0, atol=1e-15)
+    assert np.allclose(rot.to_rotation_vector(a[None])[0], rot.to_rotation_vector(a), rtol=1e-12, atol=1e-15)
