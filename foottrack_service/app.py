@@ -19,6 +19,7 @@ from foottrack_service.bus.log import BusLogHandler
 from foottrack_service.bus.session import SessionInfo, publish_session
 from foottrack_service.config import Settings
 from foottrack_service.fusion import node as fusion_node
+from foottrack_service.headset import node as headset_node
 from foottrack_service.imu import node as imu_node
 from foottrack_service.recording import node as recording_node
 from foottrack_service.recording.node import Recorder
@@ -38,16 +39,29 @@ class NodeFailed(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A part of the service. A vital one ends the service when it fails; others are restarted."""
+    """A part of the service. A vital one ends the service when it fails; others are restarted.
+
+    ``wanted`` says whether the settings ask for it; who names it by hand gets it in any case.
+    """
 
     name: str
     run: NodeRun
     vital: bool = False
+    wanted: Callable[[Settings], bool] = lambda settings: True
+
+
+async def _camera(bus: Bus, settings: Settings) -> None:
+    # OpenCV is loaded where somebody looks at pictures.
+    from foottrack_service.camera import node
+
+    await node.run(bus, settings)
 
 
 NODES: dict[str, Node] = {
     "fusion": Node("fusion", fusion_node.run, vital=True),
-    "imu": Node("imu", imu_node.run),
+    "imu": Node("imu", imu_node.run, wanted=lambda settings: not settings.imu.idle),
+    "headset": Node("headset", headset_node.run, wanted=lambda settings: not settings.headset.idle),
+    "camera": Node("camera", _camera, wanted=lambda settings: settings.camera.source.kind != "none"),
 }
 """Nodes by the name that ``foottrack node NAME`` takes."""
 
@@ -135,6 +149,7 @@ class Service:
             {**self._recorder.handlers, **self._replays.handlers},
             session=self._session,
             board=self.bus.health,
+            doorkeeper=self._broker.doorkeeper,
         )
         self._endpoints = self._broker.endpoints.model_copy(update={"control": self._control.endpoint})
         system = self.bus.publisher("service")

@@ -21,6 +21,7 @@ from foottrack_protocol.frames import TAG_ON_INSTEP
 from foottrack_protocol.messages import Float, Quat, Side, Vec3
 from foottrack_protocol.topics import DEFAULT_USER, is_user
 from foottrack_service.camera.settings import SourceSettings
+from foottrack_service.headset.settings import HeadsetSettings
 from foottrack_service.imu.settings import ImuSettings
 
 DEFAULT_FILE = Path("foottrack.toml")
@@ -193,6 +194,7 @@ class Settings(BaseSettings):
     feet: FeetSettings = FeetSettings()
     camera: CameraSettings = CameraSettings()
     imu: ImuSettings = ImuSettings()
+    headset: HeadsetSettings = HeadsetSettings()
     timing: TimingSettings = TimingSettings()
     fusion: FusionSettings = FusionSettings()
     bus: BusSettings = BusSettings()

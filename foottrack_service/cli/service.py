@@ -60,7 +60,8 @@ async def _serve(settings: Settings) -> None:
             err=True,
         )
         for each in NODES.values():
-            service.start(each)
+            if each.wanted(settings):
+                service.start(each)
         await service.failed()
 
 

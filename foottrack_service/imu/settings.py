@@ -58,3 +58,8 @@ class ImuSettings(_Section):
     right: ImuDeviceSettings = ImuDeviceSettings()
     slimevr_host: str = Field(default="0.0.0.0", description="where SlimeVR trackers are awaited")
     slimevr_port: Annotated[int, Field(ge=0, le=65535)] = DEFAULT_PORT
+
+    @property
+    def idle(self) -> bool:
+        """Whether the node has nothing to do."""
+        return self.left.format == self.right.format == "off"

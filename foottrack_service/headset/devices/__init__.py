@@ -1,0 +1,1 @@
+"""The other end, simulated: the demo and the tests let these send."""

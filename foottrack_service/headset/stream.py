@@ -1,0 +1,106 @@
+"""One source's poses as ``head/pose`` bodies: loss, jumps of the stage, and what cannot be, in one place for all."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import NamedTuple
+
+import numpy as np
+from pydantic import ValidationError
+
+from foottrack_protocol.messages import HeadPose, Pose
+from foottrack_service import rotations
+from foottrack_service.headset.rigid import Rigid
+
+SILENCE_S = 0.25
+"""A source that says nothing for so long has lost the head."""
+MAX_SPEED_M_S = 6.0
+MAX_RATE_RAD_S = 25.0
+"""No head is faster: quick turns of a head reach 12 rad/s, lunges 3 m/s."""
+SLACK_M = 0.03
+SLACK_RAD = 0.1
+"""Noise, and stamps that err by a few ms."""
+
+
+class HeadMessage(NamedTuple):
+    """A body and the instant at which it was true, bus clock, ns."""
+
+    t: int
+    body: HeadPose
+
+
+class HeadStream:
+    """Feed it what a source says, in order.
+
+    ``taken`` counts messages by kind, ``drops`` what was left out, by reason. A pose that no head can have reached is
+    held to be a glitch and published as not tracked; when the next one stays there the stage has jumped, which is a
+    new ``origin``, without ``moved``: nobody knows how far it jumped and how far the head moved.
+    """
+
+    def __init__(self) -> None:
+        self.taken: Counter[str] = Counter()
+        self.drops: Counter[str] = Counter()
+        self._origin = 0
+        self._last: tuple[int, Rigid] | None = None
+        self._suspect: tuple[int, Rigid] | None = None
+        self._recentred: Pose | None = None
+        self._skip_check = False
+
+    @property
+    def origin(self) -> int:
+        """The stage's number."""
+        return self._origin
+
+    def pose(self, t: int, head: Rigid) -> HeadMessage | None:
+        """A tracked pose at ``t`` (bus clock, ns), head to stage; None for one that is as old as the last."""
+        if self._last is not None and t <= self._last[0]:
+            self.drops["repeated"] += 1
+            return None
+        if not self._skip_check and self._last is not None and not _reachable(self._last, (t, head)):
+            if self._suspect is None or not _reachable(self._suspect, (t, head)):
+                self._suspect = (t, head)
+                self.drops["glitch"] += 1
+                return self._untracked(t)
+            self._origin += 1
+            self.taken["jumps"] += 1
+        moved, self._recentred = self._recentred, None
+        self._skip_check, self._suspect = False, None
+        try:
+            body = HeadPose(p=_tuple(head.p), q=_tuple(head.q), tracked=True, origin=self._origin, moved=moved)
+        except ValidationError:
+            self.drops["wire"] += 1
+            return None
+        self._last = (t, head)
+        self.taken["poses"] += 1
+        return HeadMessage(t, body)
+
+    def lost(self, t: int) -> HeadMessage:
+        """The source does not know where the head is at ``t``, ns."""
+        self._suspect = None
+        return self._untracked(t)
+
+    def recentred(self, moved: Rigid | None) -> None:
+        """The source says that its stage is another one from the next pose on; ``moved`` old stage to new, if known."""
+        self._origin += 1
+        self._skip_check = True
+        self._recentred = None if moved is None else Pose(p=_tuple(moved.p), q=_tuple(moved.q))
+        self.taken["recentred"] += 1
+
+    def silent(self, now: int) -> bool:
+        """Whether nothing was tracked for so long that ``lost`` is due. False before the first pose."""
+        return self._last is not None and now - self._last[0] > SILENCE_S * 1e9
+
+    def _untracked(self, t: int) -> HeadMessage:
+        self.taken["untracked"] += 1
+        return HeadMessage(t, HeadPose(tracked=False, origin=self._origin))
+
+
+def _reachable(a: tuple[int, Rigid], b: tuple[int, Rigid]) -> bool:
+    dt = (b[0] - a[0]) * 1e-9
+    far = float(np.linalg.norm(b[1].p - a[1].p))
+    turned = float(rotations.angle_between(a[1].q, b[1].q))
+    return far <= MAX_SPEED_M_S * dt + SLACK_M and turned <= MAX_RATE_RAD_S * dt + SLACK_RAD
+
+
+def _tuple(values: rotations.Array) -> tuple[float, ...]:
+    return tuple(values.tolist())
