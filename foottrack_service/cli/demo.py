@@ -6,7 +6,7 @@ import asyncio
 import sys
 from collections import defaultdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -17,15 +17,29 @@ from rich.table import Table
 
 from foottrack_protocol import Message
 from foottrack_protocol.frames import SIDES
-from foottrack_service.bus.clock import BusClock
+from foottrack_service.bus.clock import now
 from foottrack_service.bus.subscriber import Received
-from foottrack_service.cli.running import ConfigOption, JsonOption, print_json, run_loop, settings_for
+from foottrack_service.cli.running import (
+    EXIT_USAGE,
+    CommandFailed,
+    ConfigOption,
+    JsonOption,
+    print_json,
+    run_loop,
+    settings_for,
+)
 from foottrack_service.cli.watch import StreamRates, rates_table
 from foottrack_service.config import Settings
 from foottrack_service.evaluation.statistics import summary_mm
 from foottrack_service.evaluation.truth import TruthTrack
 
+if TYPE_CHECKING:
+    from foottrack_service.demo.hardware import Hardware
+    from foottrack_service.simulation.scenario import Scenario
+
 _REDRAW_S = 0.25
+_LEAD_NS = 3_000_000_000
+"""From the service's start to the scenario's: the camera's process needs it to get going."""
 
 
 def demo(
@@ -37,6 +51,12 @@ def demo(
     imu_hz: Annotated[
         float, typer.Option("--imu-hz", min=20.0, max=1000.0, help="Rate of the simulated IMUs.")
     ] = 100.0,
+    camera: Annotated[
+        str,
+        typer.Option(
+            "--camera", help="rendered (drawn pictures, really searched), simulated (finds made up), or none."
+        ),
+    ] = "rendered",
     record: Annotated[Path | None, typer.Option("--record", help="Write a recording (MCAP) as well.")] = None,
     listen: Annotated[
         str | None,
@@ -47,12 +67,15 @@ def demo(
 ) -> None:
     """Track two simulated feet, live, and say how far off they were. Engines can connect meanwhile.
 
-    Example: foottrack demo --seconds 30 --task walk --record walk.mcap
+    The hardware is simulated, all behind it is real: IMU bytes come from serial ports, the headset sends datagrams,
+    pictures are searched. Example: foottrack demo --seconds 30 --task walk --record walk.mcap
     """
     settings = settings_for(config, None, listen)
+    scenario, hardware = _plugged_in(settings, task, seed, seconds, imu_hz, camera)
     watched = Watched()
     try:
-        run_loop(_demo(settings, task, seed, seconds, imu_hz, record, watched, quiet=as_json))
+        with hardware:
+            run_loop(_demo(scenario, hardware, record, watched, quiet=as_json))
     except KeyboardInterrupt:
         typer.echo("Stopped early.", err=True)
     results = watched.results()
@@ -114,48 +137,56 @@ class Watched:
         return summary_mm(np.linalg.norm(p - track.position(t[covered]), axis=1))
 
 
-async def _demo(
-    settings: Settings,
-    task: str,
-    seed: int,
-    seconds: float,
-    imu_hz: float,
-    record: Path | None,
-    watched: Watched,
-    quiet: bool,
-) -> None:
-    from foottrack_service.app import NODES, Service, recorder_node
+def _plugged_in(
+    settings: Settings, task: str, seed: int, seconds: float, imu_hz: float, camera: str
+) -> tuple[Scenario, Hardware]:
     from foottrack_service.cli.sim import scenario_for
-    from foottrack_service.simulation import node as simulation
+    from foottrack_service.demo.hardware import PICTURES, Hardware
 
-    scenario = scenario_for(task, seed, settings, seconds=seconds, imu_hz=imu_hz)
+    if camera not in PICTURES:
+        raise CommandFailed(f"--camera is {', '.join(PICTURES)}, not {camera!r}", EXIT_USAGE)
+    finds = {"camera": camera == "simulated"}
+    scenario = scenario_for(task, seed, settings, seconds=seconds, imu_hz=imu_hz, **finds)
+    return scenario, Hardware(scenario, settings, imu_hz, camera)
+
+
+async def _demo(scenario: Scenario, hardware: Hardware, record: Path | None, watched: Watched, quiet: bool) -> None:
+    from foottrack_service.app import NODES, Service, recorder_node
+
+    start = now() + _LEAD_NS
+    settings = hardware.found_by(start)
     async with Service(settings) as service:
-        service.start(NODES["fusion"])
+        for node in NODES.values():
+            if node.wanted(settings):
+                service.start(node)
         await service.running("fusion")
         if record is not None:
             service.start(recorder_node(record))
             await service.running("recorder")
         subscriber = service.bus.subscriber()
         await subscriber.ready()
+        for name in hardware.nodes:
+            await service.running(name)
         rates = StreamRates(subscriber)
-        began = service.bus.clock()
-        play = asyncio.ensure_future(simulation.run(service.bus, settings, scenario))
+        play = asyncio.ensure_future(hardware.play(service.bus, start))
         console = Console(stderr=True)
         shown = Live(console=console, auto_refresh=False, transient=True) if not quiet and sys.stderr.isatty() else None
-        if shown is None and not quiet:
-            console.print(f"{task}, {seconds:g} s, publishers on {service.endpoints.ingress} ...")
+        if not quiet:
+            console.print(f"{scenario.task}, {scenario.seconds:g} s, publishers on {service.endpoints.ingress} ...")
+            for note in hardware.notes:
+                console.print(note)
         try:
             if shown is not None:
                 shown.start()
-            await _watch(subscriber, play, rates, watched, shown, service.bus.clock, seconds)
+            await _watch(subscriber, play, rates, watched, shown, start, scenario.seconds)
         finally:
             if shown is not None:
                 shown.stop()
-            now = service.bus.clock()
-            watched.seconds = (now - began) * 1e-9
+            ended = now()
+            watched.seconds = max(0.001, (ended - start) * 1e-9)
             watched.streams = {
                 topic: {"hz": round(row.messages / watched.seconds, 1), "gaps": row.gaps}
-                for topic, row in rates.rows(now).items()
+                for topic, row in rates.rows(ended).items()
             }
             play.cancel()
             await asyncio.gather(play, return_exceptions=True)
@@ -167,12 +198,12 @@ async def _watch(
     rates: StreamRates,
     watched: Watched,
     shown: Live | None,
-    clock: BusClock,
+    start: int,
     seconds: float,
 ) -> None:
+
     loop = asyncio.get_running_loop()
     redraw = loop.time()
-    began = clock()
     batches = aiter(subscriber.batches())
     pending = asyncio.ensure_future(anext(batches))
     try:
@@ -185,10 +216,10 @@ async def _watch(
                 pending = asyncio.ensure_future(anext(batches))
             if shown is not None and loop.time() >= redraw:
                 redraw = loop.time() + _REDRAW_S
-                now = clock()
-                done = min(1.0, (now - began) * 1e-9 / seconds)
+                t = now()
+                done = min(1.0, max(0.0, (t - start) * 1e-9 / seconds))
                 bar = ProgressBar(total=1.0, completed=done, width=60)
-                shown.update(Group(rates_table(rates.rows(now)), bar), refresh=True)
+                shown.update(Group(rates_table(rates.rows(t)), bar), refresh=True)
     finally:
         pending.cancel()
         await asyncio.gather(pending, return_exceptions=True)

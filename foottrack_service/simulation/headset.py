@@ -21,7 +21,7 @@ HEAD_HZ = 90.0
 _P_NOISE = 0.2e-3  # m SD, white
 _Q_NOISE = math.radians(0.02)  # rad SD, white
 _P_WANDER, _Q_WANDER, _WANDER_TAU_S = 0.5e-3, math.radians(0.03), 20.0
-_LATENCY_S, _LATENCY_JITTER_S = 5e-3, 0.5e-3  # s; poses are polled, so the 22 ms to the display do not count
+LATENCY_S, _LATENCY_JITTER_S = 5e-3, 0.5e-3  # s; poses are polled, so the 22 ms to the display do not count
 
 
 @dataclass
@@ -80,7 +80,7 @@ def measured(head: Track, seconds: float, faults: Sequence[Fault], random: np.ra
     error = _Q_NOISE * random.standard_normal((n, 3))
     error += noise.gauss_markov(random, n, 1.0 / HEAD_HZ, _WANDER_TAU_S, _Q_WANDER)
     q = rotations.multiply(q, rotations.from_rotation_vector(error))
-    t_arr = np.maximum.accumulate(t + _LATENCY_S + random.exponential(_LATENCY_JITTER_S, n))
+    t_arr = np.maximum.accumulate(t + LATENCY_S + random.exponential(_LATENCY_JITTER_S, n))
 
     changes, lies = stages(faults)
     origin = np.searchsorted(changes, t, side="right").astype(np.int64)

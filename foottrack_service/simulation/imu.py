@@ -95,7 +95,7 @@ _LEVELLING_TAU_S = 3.0  # how slowly a device trusts its accelerometer about wha
 _DROP_SHARE = 0.002  # a healthy radio or serial link; bursts are faults
 _SKEW_SD = 30e-6  # a crystal's tolerance
 _STAMP_JITTER_SD = 0.15e-3  # s, left over after dejittering
-_LATENCY_S, _LATENCY_JITTER_S = 2.5e-3, 0.6e-3  # s to the host, and the exponential tail on top
+LATENCY_S, _LATENCY_JITTER_S = 2.5e-3, 0.6e-3  # s to the host, and the exponential tail on top
 
 
 @dataclass
@@ -176,7 +176,7 @@ def measured(
     begun = int(random.integers(10**6, 10**9))
     t_dev = np.rint(begun + 1e6 * (t - t[:1]) / (1.0 + skew)).astype(np.int64)
     stamps = t + delay + _STAMP_JITTER_SD * random.standard_normal(n)
-    t_arr = np.maximum.accumulate(t + _LATENCY_S + random.exponential(_LATENCY_JITTER_S, n))
+    t_arr = np.maximum.accumulate(t + LATENCY_S + random.exponential(_LATENCY_JITTER_S, n))
     samples = ImuSamples(
         np.maximum.accumulate(stamps),
         t_dev,
