@@ -19,7 +19,7 @@ func _init() -> void:
 			else:
 				_understood(vector)
 				valid += 1
-	print("RESULT " + JSON.stringify({"valid": valid, "invalid": invalid, "differences": _differences}))
+	print("LINE " + JSON.stringify({"valid": valid, "invalid": invalid, "differences": _differences}))
 	quit()
 
 

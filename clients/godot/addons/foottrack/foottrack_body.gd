@@ -43,7 +43,7 @@ const _KEYS := {"Left": "left", "Right": "right"}
 @export var lead := 0.0
 
 var _humanoid: Humanoid
-var _weights := {"Left": 0.0, "Right": 0.0}
+var _weights := {"Hips": 0.0, "Left": 0.0, "Right": 0.0}
 var _delta := 0.0
 var _shift := Vector3.ZERO
 
@@ -88,25 +88,31 @@ func _fresh(stream: String) -> Message:
 func _track() -> void:
 	var skeleton := get_skeleton()
 	var message := _fresh("pose/body")
+	var body: Dictionary = message.data if message != null else {}
 	var to_skeleton := skeleton.global_transform.affine_inverse() * _stage_in_world()
 	var lift := Vector3(0.0, _humanoid.ankle_height() * skeleton.global_basis.get_scale().y - ankle_height, 0.0)
-	var hips := _humanoid.hips_at_rest()
-	if message != null and message.data["hips"] != null:
-		hips = _placed(to_skeleton, message.data["hips"], lift)
+	var ankles := {}
+	var knees := {}
+	for side: String in Humanoid.SIDES:
+		var foot: Variant = body.get(_KEYS[side])
+		if foot == null or foot["stage"] == "lost":
+			continue
+		var ahead := clampf(client.age(message) + lead, 0.0, MAX_EXTRAPOLATION_S)
+		var moved := Frames.vector(foot["v"]) * ahead
+		ankles[side] = _placed(to_skeleton, foot["ankle"], lift + moved)
+		if foot["knee"] != null:
+			knees[side] = to_skeleton * (Frames.vector(foot["knee"]) + lift + 0.5 * moved)
+	var hips := _humanoid.hips_over(ankles)
+	var weight := _weight("Hips", body.get("hips") != null)
+	if body.get("hips") != null:
+		hips = hips.interpolate_with(_placed(to_skeleton, body["hips"], lift), weight)
 	_humanoid.pose_hips(skeleton, hips)
 	for side: String in Humanoid.SIDES:
-		var foot: Variant = message.data[_KEYS[side]] if message != null else null
 		var ankle := _humanoid.ankle_below(hips, side)
-		var pole := hips * Vector3(0.0, 0.0, -1.0)
-		var known: bool = foot != null and foot["stage"] != "lost"
-		var weight := _weight(side, known)
-		if known:
-			var ahead := clampf(client.age(message) + lead, 0.0, MAX_EXTRAPOLATION_S)
-			var moved := Frames.vector(foot["v"]) * ahead
-			ankle = ankle.interpolate_with(_placed(to_skeleton, foot["ankle"], lift + moved), weight)
-			if foot["knee"] != null:
-				pole = to_skeleton * (Frames.vector(foot["knee"]) + lift + 0.5 * moved)
-		_humanoid.pose_leg(skeleton, hips, side, ankle, pole)
+		weight = _weight(side, ankles.has(side))
+		if ankles.has(side):
+			ankle = ankle.interpolate_with(ankles[side], weight)
+		_humanoid.pose_leg(skeleton, hips, side, ankle, knees.get(side, hips * Vector3.FORWARD))
 
 
 ## The walker's legs, in the avatar's own frame.
@@ -122,7 +128,7 @@ func _step() -> void:
 	_humanoid.pose_hips(skeleton, hips)
 	for side: String in Humanoid.SIDES:
 		var ankle := _humanoid.ankle_below(hips, side)
-		var pole := hips * Vector3(0.0, 0.0, -1.0)
+		var pole := hips * Vector3.FORWARD
 		var weight := _weight(side, message != null)
 		if message != null:
 			var foot: Dictionary = message.data[_KEYS[side]]
@@ -146,21 +152,24 @@ func _walk(delta: float) -> void:
 	skeleton.global_position += heading * message.data["speed"] * delta
 
 
-## The user's bones do not stretch: their length is that of the legs in any message.
+## The user's bones do not stretch: any message has their length.
 func _scale() -> void:
 	var message := _fresh("pose/body")
 	if message == null:
 		return
 	var length := 0.0
+	var legs := 0
 	for key: String in _KEYS.values():
 		var foot: Variant = message.data[key]
 		if foot == null or foot["hip"] == null or foot["knee"] == null:
-			return
+			continue
 		var knee := Frames.vector(foot["knee"])
-		length += knee.distance_to(Frames.vector(foot["hip"])) / 2.0
-		length += knee.distance_to(Frames.vector(foot["ankle"]["p"])) / 2.0
+		length += knee.distance_to(Frames.vector(foot["hip"])) + knee.distance_to(Frames.vector(foot["ankle"]["p"]))
+		legs += 1
+	if legs == 0:
+		return
 	var skeleton := get_skeleton()
-	var size := length / _humanoid.leg_length() * _stage_in_world().basis.get_scale().y
+	var size := length / legs / _humanoid.leg_length() * _stage_in_world().basis.get_scale().y
 	if length > 0.1 and absf(size / skeleton.global_basis.get_scale().y - 1.0) > 0.005:
 		skeleton.global_basis = skeleton.global_basis.orthonormalized().scaled_local(Vector3.ONE * size)
 
@@ -187,9 +196,9 @@ func _placed(to_skeleton: Transform3D, pose: Dictionary, shift: Vector3) -> Tran
 	return Transform3D(placed.basis.orthonormalized(), placed.origin)
 
 
-func _weight(side: String, known: bool) -> float:
-	_weights[side] = move_toward(_weights[side], 1.0 if known else 0.0, _delta / RELEASE_S)
-	return smoothstep(0.0, 1.0, _weights[side])
+func _weight(part: String, known: bool) -> float:
+	_weights[part] = move_toward(_weights[part], 1.0 if known else 0.0, _delta / RELEASE_S)
+	return smoothstep(0.0, 1.0, _weights[part])
 
 
 ## Without what `_look` has moved it by: the avatar must not run after its own eyes.

@@ -84,6 +84,22 @@ func hips_at_rest() -> Transform3D:
 	return Transform3D(facing, centre)
 
 
+## The frame of the hips' centre when only feet are known, their frames by side: as high as at rest, over the middle of
+## the feet, facing where they face.
+func hips_over(ankles: Dictionary) -> Transform3D:
+	var forward := Vector3.ZERO
+	for ankle: Transform3D in ankles.values():
+		forward -= Vector3(ankle.basis.z.x, 0.0, ankle.basis.z.z)
+	if forward.length_squared() < 1e-6:
+		return hips_at_rest()
+	var basis := Basis.looking_at(forward)
+	var sum := Vector3.ZERO
+	for side: String in ankles:
+		sum += ankles[side].origin - basis * facing.inverse() * (legs[side].hip.origin - centre)
+	sum /= ankles.size()
+	return Transform3D(basis, Vector3(sum.x, centre.y, sum.z))
+
+
 ## The frame of an ankle at rest, carried along by the hips.
 func ankle_below(hips: Transform3D, side: String) -> Transform3D:
 	var ankle: Vector3 = legs[side].ankle.origin

@@ -121,10 +121,10 @@ func _run(host: String, ingress: int, egress: int, control: int, prefixes: Packe
 		_mutex.lock()
 		var stopping := _stop
 		_keep(batch)
-		_live = down.is_live
 		_offset = asks.time.offset
 		_fresh_until_ns = asks.time.fresh_until()
-		if now >= next_state_usec:
+		if now >= next_state_usec or down.is_live != _live:
+			_live = down.is_live
 			next_state_usec = now + _STATE_PERIOD_USEC
 			_state = _describe(down, up, asks)
 		var outbox := _outbox

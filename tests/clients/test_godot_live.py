@@ -1,0 +1,89 @@
+"""The addon against the running service: nothing lost, found again after a restart, head poses that fusion can use."""
+
+from __future__ import annotations
+
+import pytest
+from client_traffic import FINAL, POSE, ports, step
+from godot_project import GodotProject
+from live_service import LiveService
+
+from foottrack_client import Client
+from foottrack_protocol.messages import HeadPose
+
+pytestmark = pytest.mark.engine
+
+
+def test_events_are_lossless_and_poses_the_newest(godot: GodotProject, service: LiveService) -> None:
+    with godot.start("client.gd", ports(service.endpoints)) as run, Client(service.endpoints) as client:
+        publisher = client.publisher("test")
+        publisher.wait_ready()
+        run.until("connected")
+        for number in range(1500):
+            publisher.publish("gait/event", step(number))
+            publisher.publish("pose/body", POSE)
+        publisher.publish("gait/event", FINAL)
+        said = run.until("final")
+    assert said["steps"] == list(range(1500))
+    assert said["poses"] == sorted(set(said["poses"]))
+    topics = said["statistics"]["topics"]
+    assert topics["user/pose/body"]["messages"] == 1500
+    assert topics["user/pose/body"]["gaps"] == topics["user/gait/event"]["gaps"] == 0
+    assert said["statistics"]["drops"] == {}
+
+
+def test_a_service_that_restarts_twice_is_found_again_and_the_loss_is_exact(
+    godot: GodotProject, service: LiveService
+) -> None:
+    with godot.start("client.gd", ports(service.endpoints)) as run, Client(service.endpoints) as client:
+        publisher = client.publisher("test")
+        number = 0
+        for restarts in range(3):
+            publisher.wait_ready()
+            run.until("connected")
+            for _ in range(50):
+                assert publisher.publish("gait/event", step(number))
+                number += 1
+            if restarts == 2:
+                break
+            while run.until("frames")["statistics"]["topics"]["user/gait/event"]["messages"] < 50 * (restarts + 1):
+                pass
+            session = run.until("frames", synchronised=True)["statistics"]["session"]
+            service.stop()
+            assert run.until("disconnected")["why"]
+            while publisher.live:
+                pass
+            for _ in range(7):
+                assert not publisher.publish("gait/event", step(number))
+                number += 1
+            service.start()
+        publisher.publish("gait/event", FINAL)
+        said = run.until("final")
+    assert said["steps"] == [*range(50), *range(57, 107), *range(114, 164)]
+    assert said["statistics"]["topics"]["user/gait/event"]["gaps"] == 14
+    assert said["statistics"]["welcomes"] == 3
+    assert said["statistics"]["session"] != session
+
+
+def test_head_poses_are_stamped_on_the_bus_clock(godot: GodotProject, service: LiveService) -> None:
+    settings = {**ports(service.endpoints), "head": True}
+    with Client(service.endpoints) as client, client.subscribe("head/pose") as heads:
+        heads.wait_ready()
+        began = client.clock()
+        with godot.start("client.gd", settings) as run:
+            run.until("frames", synchronised=True)
+            received = []
+            while len([message for message in received if message.valid]) < 50:
+                message = heads.receive(20.0)
+                assert message is not None
+                received.append(message)
+            ended = client.clock()
+    valid = [message for message in received if message.valid]
+    assert [message.seq for message in received] == list(range(received[0].seq, received[0].seq + len(received)))
+    # Right to the clock's own uncertainty, which is far below the 1 ms allowed for here.
+    assert all(began < message.t <= message.t_pub < ended + 1_000_000 for message in valid)
+    stamps = [message.t for message in valid]
+    assert stamps == sorted(stamps)
+    body = valid[-1].data
+    assert isinstance(body, HeadPose)
+    assert body.p == pytest.approx((0.25, 1.5, -0.5), abs=1e-6)
+    assert body.q == pytest.approx((0.0, 0.5**0.5, 0.0, 0.5**0.5), abs=1e-6)
