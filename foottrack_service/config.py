@@ -21,6 +21,7 @@ from foottrack_protocol.frames import TAG_ON_INSTEP
 from foottrack_protocol.messages import Float, Quat, Side, Vec3
 from foottrack_protocol.topics import DEFAULT_USER, is_user
 from foottrack_service.camera.settings import SourceSettings
+from foottrack_service.gait.settings import GaitSettings
 from foottrack_service.headset.settings import HeadsetSettings
 from foottrack_service.imu.settings import ImuSettings
 
@@ -197,6 +198,7 @@ class Settings(BaseSettings):
     headset: HeadsetSettings = HeadsetSettings()
     timing: TimingSettings = TimingSettings()
     fusion: FusionSettings = FusionSettings()
+    gait: GaitSettings = GaitSettings()
     bus: BusSettings = BusSettings()
     recording: RecordingSettings = RecordingSettings()
 

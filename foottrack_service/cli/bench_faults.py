@@ -130,7 +130,7 @@ def _recentred(known: bool) -> dict[str, Any]:
     worst, missing, back = 0.0, 0, at
     for out in fuse(arrivals, FusionCore(settings)):
         seconds = (out.t - scenario.start) * 1e-9
-        if seconds < at + 0.1 or seconds > 7.9:
+        if out.stream != "pose/body" or seconds < at + 0.1 or seconds > 7.9:
             continue
         nearest = int(stamps[np.argmin(np.abs(stamps - out.t))])
         for side in SIDES:

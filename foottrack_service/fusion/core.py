@@ -29,6 +29,7 @@ from foottrack_service.body.skeleton import Skeleton
 from foottrack_service.body.solver import BodySolver, FootPlace, Legs
 from foottrack_service.config import Settings
 from foottrack_service.fusion.foot import Foot
+from foottrack_service.fusion.gait_link import GaitLink
 from foottrack_service.fusion.head_history import HeadHistory
 from foottrack_service.fusion.interface import FootEstimate, HeadSample
 from foottrack_service.rotations import Array
@@ -39,12 +40,13 @@ _MOST_DISTANCE = 1000.0
 
 
 class FusionCore:
-    """Fuses one user's measurements into ``pose/body``."""
+    """Fuses one user's measurements into ``pose/body``, and what follows from it: ``pose/ik`` and ``gait/*``."""
 
     def __init__(self, settings: Settings, sid: str = "offline") -> None:
         self._user = settings.user
         self._sid = sid
         self._body = BodySolver(Skeleton.of(settings.body), settings.body.solver)
+        self._gait = GaitLink(settings, self._body.skeleton)
         self._heads = HeadHistory()
         self._origin: int | None = None
         self._feet: dict[Side, Foot] = {side: Foot(settings, side, self._heads) for side in SIDES}
@@ -131,6 +133,7 @@ class FusionCore:
                 foot.on_floor(found.values.height)
         elif isinstance(found, BodyCalibration):
             self._body.skeleton = Skeleton.calibrated(found.values)
+            self._gait.wear(self._body.skeleton)
         elif isinstance(found, HeadingCalibration):
             for side, foot in self._feet.items():
                 yaw = getattr(found.values.imu_yaw, side)
@@ -163,7 +166,13 @@ class FusionCore:
             left=self._foot_pose("left", feet.get("left"), legs),
             right=self._foot_pose("right", feet.get("right"), legs),
         )
-        return [self._message("pose/body", now, now, body)]
+        gait = self._gait.update(now, feet.get("left"), feet.get("right"), head)
+        return [
+            self._message("pose/body", now, now, body),
+            self._message("pose/ik", now, now, gait.ik),
+            self._message("gait/state", now, now, gait.state),
+            *(self._message("gait/event", t, now, event) for t, event in gait.events),
+        ]
 
     def _foot_pose(self, side: Side, found: FootEstimate | None, legs: Legs | None) -> FootPose | None:
         if found is None:

@@ -6,6 +6,28 @@ from foottrack_service.body.skeleton import Skeleton
 from foottrack_service.config import FootSettings, Settings
 from foottrack_service.fusion.interface import FootEstimate, HeadSample
 from foottrack_service.gait import samples
+from foottrack_service.gait.gait import Gait
+
+
+class GaitLink:
+    """The gait of the core's user."""
+
+    def __init__(self, settings: Settings, skeleton: Skeleton) -> None:
+        self._settings = settings
+        self._wearer = wearer(settings, skeleton)
+        self._gait = Gait(self._wearer, settings.gait)
+
+    def wear(self, skeleton: Skeleton) -> None:
+        """The body was calibrated: other measures begin a new gait. The same ones come every 5 s and change nothing."""
+        found = wearer(self._settings, skeleton)
+        if found != self._wearer:
+            self._wearer, self._gait = found, Gait(found, self._settings.gait)
+
+    def update(
+        self, now: int, left: FootEstimate | None, right: FootEstimate | None, head: HeadSample | None
+    ) -> samples.GaitOutputs:
+        """The gait at ``now`` ns."""
+        return self._gait.update(now, foot_sample(left), foot_sample(right), head_sample(head))
 
 
 def wearer(settings: Settings, skeleton: Skeleton) -> samples.Wearer:

@@ -106,17 +106,14 @@ class FootPhases:
         self._tip = self._slide = (0.0, 0.0)
         self._heel_off_ns: int | None = None
         self._off_ns: int | None = None
+        self.ankle_y: float | None = None
+        """Where the ankle was last, stage, m."""
         self.events = []
 
     @property
     def standing(self) -> bool:
         """Whether the foot is in stance with its heel down, as far as can be told."""
         return self.phase == "stance" and self._heel_off_ns is None
-
-    @property
-    def ankle_height(self) -> float | None:
-        """Of the stance, stage, m; None before the first sample."""
-        return self._floor
 
     def update(self, t: int, foot: FootSample) -> None:
         """Take a sample at ``t`` ns."""
@@ -126,6 +123,7 @@ class FootPhases:
         dt = _HOLE_S if last is None else (t - last) * 1e-9
         if dt <= 0.0:
             return
+        self.ankle_y = foot.p[1]
         x, y, z, w = foot.q
         along, up = 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + z * z)
         # The toes' tip, from the ankle, over the floor.
@@ -136,7 +134,8 @@ class FootPhases:
         )
         if dt >= _HOLE_S:
             self.reset()
-            self._floor, self._level, self._tip = foot.p[1], along, tip
+            self.ankle_y = self._floor = foot.p[1]
+            self._level, self._tip = along, tip
             self._t, self.vy = t, foot.v[1]
             return
         self._t, self.vy = t, foot.v[1]
@@ -270,7 +269,7 @@ class FootPhases:
     def _land(self, t: int, dt: float, low_before: float) -> None:
         slowing = (self._low_speed - low_before) / dt
         left = -self._low_speed / slowing if low_before < 0.0 and slowing > 1.0 else 0.0
-        strike = t + round(1e9 * min(max(left, -dt), 0.02))
+        strike = t + round(1e9 * min(max(left, -dt), 0.0))
         if self.phase != "terminal_swing":
             self.events.append((min(strike, t), "terminal_swing"))
         self.events.append((strike, "foot_strike"))

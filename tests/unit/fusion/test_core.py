@@ -42,8 +42,16 @@ AT_ONCE = Settings(fusion=FusionSettings(filter="reference"))
 """The reference filter believes the first fix; ours wants fixes that agree."""
 
 
+def bodies(outs):
+    return [out for out in outs if out.stream == "pose/body"]
+
+
 def feed(core, messages):
-    return [out for each in messages for out in core.handle(each, each.t)]
+    return bodies(out for each in messages for out in core.handle(each, each.t))
+
+
+def tick(core, now):
+    return bodies(core.tick(now))
 
 
 def test_an_imu_alone_brings_its_foot_and_no_legs():
@@ -59,7 +67,7 @@ def test_an_imu_alone_brings_its_foot_and_no_legs():
 def test_head_and_tags_alone_bring_legs():
     core = FusionCore(AT_ONCE)
     outs = feed(core, [head(0), marker(0, (-0.1, -1.5, -0.15)), marker(0, (0.1, -1.5, -0.15), side="right")])
-    outs += core.tick(core.deadline)
+    outs += tick(core, core.deadline)
     body = outs[-1].data
     assert body.head.p == (0.0, 1.6, 0.0)
     assert body.left.stage == body.right.stage == "marker"
@@ -77,12 +85,12 @@ def test_outputs_come_on_data_but_no_faster_than_the_limit_and_by_the_timer_in_s
     assert stamps == [0, 5 * MS, 10 * MS, 30 * MS]
     assert core.deadline == 50 * MS
     assert core.tick(49 * MS) == []
-    (out,) = core.tick(50 * MS)
+    (out,) = tick(core, 50 * MS)
     assert out.t == 50 * MS
 
 
 def test_offline_the_timer_runs_in_virtual_time():
-    outs = list(fuse([(each.t, each) for each in (imu(0), imu(65 * MS))], FusionCore(Settings())))
+    outs = bodies(fuse([(each.t, each) for each in (imu(0), imu(65 * MS))], FusionCore(Settings())))
     assert [out.t // MS for out in outs] == [0, 20, 40, 60, 65]
     assert [out.seq for out in outs] == [0, 1, 2, 3, 4]
 
@@ -128,7 +136,7 @@ def test_a_known_recentring_moves_everything_rigidly():
     core.handle(
         head(12 * MS, p=tuple(np.array([1, 0, -2]) + rot.rotate(turn, [0, 1.6, 0])), origin=1, moved=moved), 12 * MS
     )
-    after = core.tick(core.deadline)[-1]
+    after = tick(core, core.deadline)[-1]
     expected = np.array([1, 0, -2]) + rot.rotate(turn, before.data.left.ankle.p)
     assert np.allclose(after.data.left.ankle.p, expected, atol=1e-3)
 
@@ -136,7 +144,7 @@ def test_a_known_recentring_moves_everything_rigidly():
 def test_an_unknown_recentring_begins_again_and_never_drifts_across():
     core = FusionCore(AT_ONCE)
     feed(core, [head(0), marker(0, (-0.1, -1.5, -0.15)), head(2 * MS, p=(5.0, 1.6, 5.0), origin=1)])
-    assert core.tick(core.deadline)[-1].data.left is None
+    assert tick(core, core.deadline)[-1].data.left is None
     out = feed(core, [marker(40 * MS, (-0.1, -1.5, -0.15)), imu(41 * MS)])[-1]
     assert math.dist(out.data.left.ankle.p, (4.9, 0.1, 5.0)) < 0.2
 
@@ -212,3 +220,30 @@ def test_the_same_messages_give_the_same_bytes():
     first, second = ([encode(out) for out in fuse(sequence, FusionCore(Settings()))] for _ in range(2))
     assert len(first) > 250
     assert first == second
+
+
+def test_targets_and_gait_come_with_every_pose_and_events_when_they_happen():
+    core, outs = FusionCore(Settings()), []
+    for t in range(0, 2000, 5):
+        # The toes go down and up again while the ankle is thrown up: one step in place, seen by one IMU.
+        share = min(max((t - 1000) / 400, 0.0), 1.0)
+        lift = 0.1 * (2 * math.pi / 0.4) ** 2 / 2 * math.cos(2 * math.pi * share) if 0.0 < share < 1.0 else 0.0
+        outs += core.handle(imu(t * MS, acc=(0.0, G + lift, 0.0)), t * MS)
+    by_stream = {
+        stream: [o for o in outs if o.stream == stream]
+        for stream in ("pose/body", "pose/ik", "gait/state", "gait/event")
+    }
+    assert len(by_stream["pose/body"]) == len(by_stream["pose/ik"]) == len(by_stream["gait/state"]) == 400
+    assert by_stream["gait/state"][-1].data.right is None
+    events = by_stream["gait/event"]
+    assert [o.data.event for o in events if o.data.side] == [
+        "heel_off",
+        "toe_off",
+        "mid_swing",
+        "terminal_swing",
+        "foot_strike",
+    ]
+    assert all(o.t <= o.t_pub for o in events)
+    assert [o.seq for o in events] == list(range(len(events)))
+    apex = next(o for o in events if o.data.event == "mid_swing")
+    assert apex.t == pytest.approx(1200 * MS, abs=20 * MS)

@@ -1,0 +1,209 @@
+"""Ours: legs that swing with the user's feet and stand still in the world.
+
+Each swing has a progress q that never falls. On the way up q = (1 - cos(pi/2 u)) / 2 with u the height's share of the
+person's usual peak; at the top it is anchored at what was reached; on the way down q = qa + (1 - qa) cos(pi/2 h / ha).
+The foot goes from where it was to where the step is planned to end in the measure of q:
+dz = (target - z) dq / (1 - q), which is continuous whatever the peak, and whenever the plan changes.
+[Z]'s equations 1 to 4 are its special case with peaks of y_max (and without the sine of eq. 3).
+
+A foot that is down moves at minus the avatar's speed, so it stands in the world. A step of S = speed x stance closes
+the cycle.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from foottrack_service.gait.foot_phases import FootPhases
+from foottrack_service.gait.legs import LegTarget, LegTargets, pelvis_drop
+from foottrack_service.gait.steps import Feet, Steps
+
+FIRST_PEAK = 0.12
+"""m: the peak that is expected before the first."""
+LONGEST_STEP = 0.55
+"""Of the leg: how far from the hips a step may end."""
+FARTHEST = 0.72
+"""Of the leg: how far back a planted foot may go; the avatar slows down before."""
+_SLOWING = 0.12
+"""Of the leg: over this way."""
+_DOWN, _UP = 0.004, 0.03
+"""m: a foot below the first stands, above the second it flies free; in between it goes along with the ground."""
+_SPEED_S = 0.15
+"""s: how fast the avatar's speed follows the model's."""
+_RETURN_AFTER_S = 1.5
+"""s of standing after which the legs come back under the hips [Z]."""
+_RETURN_S = 0.4
+_RETURN_LIFT, _LEAST_LIFT, _LARGEST_LIFT = 0.15, 0.02, 0.05
+"""A foot returns in a small step, lifted by a share of its way within these m. It does not slide."""
+_NEAR = 0.004
+"""m: closer is under the hips."""
+_SETTLE_S = 0.06
+_STIFFNESS = 55.0
+"""1/s: how tightly a foot in the air follows its goal. Low steps make much way of little height, and of its noise."""
+_JUMP = 0.02
+"""m: a foot whose height changes by so much more than its speed explains was not moved, but found elsewhere."""
+_TURN_RATE = 20.0
+"""rad/s: no ankle turns faster."""
+_HALF_PI: Final = 0.5 * math.pi
+
+
+class _Leg:
+    """One leg of the avatar."""
+
+    __slots__ = (
+        "down",
+        "extra",
+        "goal",
+        "height",
+        "origin",
+        "peak",
+        "pitch",
+        "progress",
+        "rate",
+        "rising",
+        "share",
+        "start",
+        "swinging",
+        "target",
+        "top",
+        "z",
+    )
+
+    def __init__(self) -> None:
+        self.z = self.goal = self.rate = self.target = self.extra = self.height = self.pitch = 0.0
+        self.swinging = self.rising = False
+        self.progress = self.share = 0.0
+        self.start = self.peak = self.top = 0.0
+        self.origin = 0.0
+        self.down = 1.0
+        """How much the foot goes along with the ground, 0 to 1."""
+
+    def swing(self, foot: FootPhases, plan: float) -> None:
+        """Follow the user's foot; ``plan`` is where a step ends that is planned now, m."""
+        height = foot.height
+        if not self.swinging:
+            self.swinging = self.rising = True
+            self.progress, self.target = 0.0, plan
+            self.start = foot.start_height
+            self.peak = max(foot.peak or FIRST_PEAK, self.start + 0.02)
+        if self.rising and foot.phase != "ascending":
+            self.rising, self.share = False, self.progress
+            self.top, self.target = max(foot.apex, 0.01), plan
+        if self.rising:
+            share = min(max((height - self.start) / (self.peak - self.start), 0.0), 1.0)
+            progress = 0.5 * (1.0 - math.cos(_HALF_PI * share))
+        else:
+            share = min(max(height / self.top, 0.0), 1.0)
+            progress = self.share + (1.0 - self.share) * math.cos(_HALF_PI * share)
+        if progress > self.progress:
+            left = 1.0 - self.progress
+            self.goal += (self.target - self.goal) * ((progress - self.progress) / left if left > 1e-6 else 1.0)
+            self.progress = progress
+
+    def show(self, foot: FootPhases, dt: float) -> LegTarget:
+        """The target. A foot that was lost, or found elsewhere, does not jump: what it jumped by fades."""
+        height = max(0.0, foot.height)
+        jump = height - self.height - foot.vy * dt
+        if abs(jump) > _JUMP:
+            self.extra -= height - self.height
+        self.height = height
+        turn = min(max(foot.pitch - self.pitch, -_TURN_RATE * dt), _TURN_RATE * dt)
+        self.pitch += turn
+        return LegTarget(self.z, max(0.0, height + self.extra), self.pitch)
+
+    def along(self, foot: FootPhases, way: float, dt: float) -> None:
+        """Go after the swing's goal, and along with the ground, which moves back by ``way`` m."""
+        if foot.phase == "stance":
+            wanted = 1.0
+        else:
+            clear = foot.lift if foot.phase == "ascending" else foot.height
+            share = min(max((clear - _DOWN) / (_UP - _DOWN), 0.0), 1.0)
+            wanted = 1.0 - share * share * (3.0 - 2.0 * share)
+        change = dt / 0.03
+        self.down += min(max(wanted - self.down, -change), change)
+        if foot.height + self.extra < _DOWN:
+            self.down = 1.0
+        if self.down >= 1.0:
+            self.goal, self.rate = self.z, 0.0
+        else:  # the exact step of a critically damped spring
+            gap, fade = self.z - self.goal, math.exp(-_STIFFNESS * dt)
+            pull = (self.rate + _STIFFNESS * gap) * dt
+            self.z = self.goal + (gap + pull) * fade
+            self.rate = (self.rate - _STIFFNESS * pull) * fade
+        self.z -= way * self.down
+        self.goal -= way * self.down
+        self.target -= way * self.down
+
+
+class WalkingLegs:
+    """See the module. ``leg`` is the wearer's, m."""
+
+    def __init__(self, leg: float) -> None:
+        self._leg = leg
+        self._legs = (_Leg(), _Leg())
+        self._speed = 0.0
+        self._returning: int | None = None
+        self._returned_s = 0.0
+
+    def update(self, t: int, dt: float, feet: Feet, steps: Steps) -> LegTargets:
+        """Targets at ``t`` ns."""
+        wanted = steps.speed(t)
+        self._speed += (wanted - self._speed) * (1.0 - math.exp(-dt / _SPEED_S))
+        if wanted == 0.0 and self._speed < 0.02:
+            self._speed = max(0.0, self._speed - 0.1 * dt)
+        speed = self._speed * self._room(feet)
+        for index, (leg, foot) in enumerate(zip(self._legs, feet, strict=True)):
+            if foot.phase != "stance":
+                if self._returning == index:
+                    self._returning = None
+                leg.swing(foot, self._plan(foot, steps, wanted, index))
+            else:
+                leg.swinging = False
+            leg.along(foot, speed * dt, dt)
+            if self._returning != index:
+                leg.extra *= math.exp(-dt / _SETTLE_S)
+        self._return(t, dt, feet, steps)
+        left, right = (leg.show(foot, dt) for leg, foot in zip(self._legs, feet, strict=True))
+        drop = pelvis_drop(self._leg, left.z, right.z)
+        return LegTargets(left, right, -drop, speed, steps.walking or speed > 0.0)
+
+    def _plan(self, foot: FootPhases, steps: Steps, speed: float, index: int) -> float:
+        if not steps.swings_in_place("left" if index == 0 else "right"):
+            return 0.0
+        swing = foot.swing_s or 0.8 * steps.step_s
+        stance = max(2.0 * steps.step_s - swing, 0.3 * steps.step_s)
+        return min(0.5 * speed * stance, LONGEST_STEP * self._leg)
+
+    def _room(self, feet: Feet) -> float:
+        """Share of the speed that the planted feet allow: nobody stands on a foot that is out of reach."""
+        back = max((-leg.z for leg, foot in zip(self._legs, feet, strict=True) if foot.phase == "stance"), default=0.0)
+        return min(max((FARTHEST * self._leg - back) / (_SLOWING * self._leg), 0.0), 1.0)
+
+    def _return(self, t: int, dt: float, feet: Feet, steps: Steps) -> None:
+        if steps.walking or self._speed > 0.0 or not (feet.left.standing and feet.right.standing):
+            self._returning = None
+            return
+        if steps.stopped_ns is not None and (t - steps.stopped_ns) * 1e-9 < _RETURN_AFTER_S:
+            return
+        if self._returning is None:
+            farther = 0 if abs(self._legs[0].z) >= abs(self._legs[1].z) else 1
+            if abs(self._legs[farther].z) < _NEAR:
+                return
+            self._returning, self._returned_s = farther, 0.0
+            self._legs[farther].origin = self._legs[farther].z
+        leg = self._legs[self._returning]
+        before = _eased(self._returned_s / _RETURN_S)
+        self._returned_s += dt
+        share = min(self._returned_s / _RETURN_S, 1.0)
+        now = _eased(share)
+        leg.z = leg.z * (1.0 - now) / (1.0 - before) if before < 1.0 else 0.0
+        lift = min(max(_RETURN_LIFT * abs(leg.origin), _LEAST_LIFT), _LARGEST_LIFT)
+        leg.extra = lift * math.sin(math.pi * share) ** 2
+        if share >= 1.0:
+            self._returning = None
+
+
+def _eased(share: float) -> float:
+    s = min(max(share, 0.0), 1.0)
+    return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
