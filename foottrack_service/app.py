@@ -17,6 +17,8 @@ from foottrack_service.bus.control import ControlServer
 from foottrack_service.bus.health import publish_health
 from foottrack_service.bus.log import BusLogHandler
 from foottrack_service.bus.session import SessionInfo, publish_session
+from foottrack_service.calibration.node import CalibrationDesk
+from foottrack_service.calibration.store import Store
 from foottrack_service.config import Settings
 from foottrack_service.fusion import node as fusion_node
 from foottrack_service.headset import node as headset_node
@@ -81,8 +83,10 @@ class Service:
     An async context manager: inside, everything runs; leaving it stops all of it in order.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, store: Store | None = None) -> None:
+        """``store`` keeps calibrations for the next start; without one they end with the service."""
         self.settings = settings
+        self._store = store
         self._broker = Broker(settings.bus)
         self._tasks: list[asyncio.Task[None]] = []
         self._failure: asyncio.Future[None] | None = None
@@ -143,10 +147,11 @@ class Service:
         self._session = SessionInfo([self.settings.user], self.settings.digest)
         self._recorder = Recorder(self.bus, self.settings, self.settings.recording.folder)
         self._replays = ReplayDesk(self._broker.context)
+        self._calibrations = CalibrationDesk(self.bus, self.settings, self._store)
         self._control = ControlServer(
             self._broker.context,
             self.settings.bus.control,
-            {**self._recorder.handlers, **self._replays.handlers},
+            {**self._recorder.handlers, **self._replays.handlers, **self._calibrations.handlers},
             session=self._session,
             board=self.bus.health,
             doorkeeper=self._broker.doorkeeper,
@@ -161,6 +166,7 @@ class Service:
         loop = asyncio.get_running_loop()
         self._tasks += [
             loop.create_task(self._control.run(), name="control"),
+            loop.create_task(self._calibrations.run(), name="calibration"),
             loop.create_task(publish_session(system, self._session), name="session"),
             loop.create_task(publish_health(system, self.bus.health, monitor), name="health"),
         ]

@@ -79,6 +79,9 @@ class FootSettings(Section):
 class FeetSettings(Section):
     """Both shoes."""
 
+    shoes: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")] = Field(
+        default="default", description="name of the pair; what is calibrated on shoes is kept by it"
+    )
     left: FootSettings = FootSettings()
     right: FootSettings = FootSettings()
 

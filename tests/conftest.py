@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
 import threading
 from collections.abc import Callable, Coroutine, Iterator
@@ -13,6 +14,7 @@ import zmq
 
 from foottrack_service.bus import Broker, Bus
 from foottrack_service.bus.endpoints import Context
+from foottrack_service.calibration.store import FOLDER_VARIABLE
 from foottrack_service.config import BusSettings
 
 EPHEMERAL = BusSettings(ingress="tcp://127.0.0.1:0", egress="tcp://127.0.0.1:0", control="tcp://127.0.0.1:0")
@@ -26,6 +28,12 @@ Run = Callable[[Coroutine[Any, Any, T]], T]
 def pytest_addoption(parser: pytest.Parser) -> None:
     """``--update-golden``: write the golden results of tests/replay anew."""
     parser.addoption("--update-golden", action="store_true", help="write the golden results of tests/replay anew")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _nobodys_calibrations(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """No test knows what the person who runs it has calibrated."""
+    os.environ[FOLDER_VARIABLE] = str(tmp_path_factory.mktemp("calibrations"))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -12,7 +12,7 @@ from foottrack_service.config import BodySettings
 _THIGH = 0.245
 _SHANK = 0.246
 _HIP_HEIGHT = 0.530
-_EYE_HEIGHT = 0.936
+EYE_HEIGHT = 0.936
 _HIP_WIDTH = 0.191 * 0.53
 """Hip joints sit at about half of the pelvis's outer breadth (0.191 of the height)."""
 _HIP_BACK = 0.05
@@ -43,7 +43,7 @@ class Skeleton:
             height=tall,
             thigh=body.thigh or _THIGH * tall,
             shank=body.shank or _SHANK * tall,
-            torso=body.torso or (_EYE_HEIGHT - _HIP_HEIGHT) * tall,
+            torso=body.torso or (EYE_HEIGHT - _HIP_HEIGHT) * tall,
             hip_width=body.hip_width or _HIP_WIDTH * tall,
             hip_back=_HIP_BACK * tall if body.hip_back is None else body.hip_back,
         )

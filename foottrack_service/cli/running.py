@@ -7,13 +7,14 @@ import json
 import logging
 import signal
 import sys
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Mapping
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, TypeVar
 
 import typer
 
-from foottrack_service.config import BusSettings, Settings, load
+from foottrack_service.calibration.store import Store
+from foottrack_service.config import BusSettings, Loaded, Settings, load
 
 T = TypeVar("T")
 
@@ -53,7 +54,13 @@ def settings_for(config: Path | None, user: str | None = None, bus: str | None =
         flags["user"] = user
     if bus is not None:
         flags["bus"] = BusSettings.beginning_at(bus).model_dump()
-    return load(config, flags).settings
+    return load_calibrated(config, flags).settings
+
+
+def load_calibrated(config: Path | None, flags: Mapping[str, Any] | None = None) -> Loaded:
+    """Settings with what calibration kept for their user and shoes. Raises ConfigError."""
+    plain = load(config, flags).settings
+    return load(config, flags, Store.at_home(plain.user, plain.feet.shoes).layer())
 
 
 def run_loop(work: Coroutine[Any, Any, T]) -> T:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from foottrack_service.cli.running import CommandFailed, ConfigOption, ConnectOption, UserOption, run_loop, settings_for
+from foottrack_service.calibration.store import Store
 from foottrack_service.config import Settings
 
 
@@ -53,7 +54,7 @@ def node(
 async def _serve(settings: Settings) -> None:
     from foottrack_service.app import NODES, Service
 
-    async with Service(settings) as service:
+    async with Service(settings, Store.at_home(settings.user, settings.feet.shoes)) as service:
         ends = service.endpoints
         typer.echo(
             f"Listening: publishers {ends.ingress}, subscribers {ends.egress}, control {ends.control}. Ctrl-C ends it.",

@@ -11,8 +11,8 @@ from pydantic import BaseModel
 from rich.console import Console
 from rich.table import Table
 
-from foottrack_service.cli.running import CommandFailed, ConfigOption, JsonOption, print_json
-from foottrack_service.config import DEFAULT_FILE, Settings, load, toml_value
+from foottrack_service.cli.running import CommandFailed, ConfigOption, JsonOption, load_calibrated, print_json
+from foottrack_service.config import DEFAULT_FILE, Settings, toml_value
 
 app = typer.Typer(no_args_is_help=True, help="Settings: write a commented file, or see what is in force.")
 
@@ -47,7 +47,7 @@ def check(
 
     Example: foottrack config check --all
     """
-    loaded = load(config)
+    loaded = load_calibrated(config)
     values = _flat(loaded.settings.model_dump(mode="json"))
     rows = {
         key: {"value": value, "from": _origin(key, loaded.origins)}

@@ -49,6 +49,7 @@ class FusionCore:
         self._gait = GaitLink(settings, self._body.skeleton)
         self._heads = HeadHistory()
         self._origin: int | None = None
+        self._calibrated: dict[tuple[str, Side | None], Any] = {}
         self._feet: dict[Side, Foot] = {side: Foot(settings, side, self._heads) for side in SIDES}
         self._toes = {side: np.array(settings.feet.of(side).toe.p) for side in SIDES}
         self._shortest_ns = round(1e9 / settings.fusion.max_output_hz)
@@ -128,6 +129,11 @@ class FusionCore:
             foot.settle(now)
 
     def _on_calibration(self, found: Any) -> None:
+        # Every calibration comes again every 5 s, and a filter that is placed anew has to find its foot again.
+        kind = (found.kind, found.values.side if isinstance(found, ImuCalibration) else None)
+        if self._calibrated.get(kind) == found:
+            return
+        self._calibrated[kind] = found
         if isinstance(found, FloorCalibration):
             for foot in self._feet.values():
                 foot.on_floor(found.values.height)

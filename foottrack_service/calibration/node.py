@@ -1,0 +1,149 @@
+"""Calibrations on a live bus: the control requests, and what was found, published when it is found and every 5 s."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from foottrack_protocol.control import Code
+from foottrack_protocol.messages import (
+    BodyCalibration,
+    FloorCalibration,
+    HeadingCalibration,
+    ImuCalibration,
+    MountCalibration,
+)
+from foottrack_service.body.skeleton import Skeleton
+from foottrack_service.bus.connection import Bus
+from foottrack_service.bus.errors import ControlError
+from foottrack_service.calibration.body import BodyFlow
+from foottrack_service.calibration.floor import FloorFlow
+from foottrack_service.calibration.flow import Flow, Refused
+from foottrack_service.calibration.heading import HeadingFlow
+from foottrack_service.calibration.mount import MountFlow
+from foottrack_service.calibration.store import Store, StoreError
+from foottrack_service.config import Settings
+
+SOURCE = "calibration"
+REPEAT_S = 5.0
+LOOK_S = 0.02
+Height = Annotated[float, Field(gt=0.5, lt=2.6)]
+
+_log = logging.getLogger(__name__)
+
+
+class CalibrationDesk:
+    """Runs the settings' user's calibrations, one at a time. Without a store nothing outlives the service."""
+
+    def __init__(self, bus: Bus, settings: Settings, store: Store | None = None) -> None:
+        self._bus, self._settings, self._store = bus, settings, store
+        self._publisher = bus.publisher(SOURCE)
+        self._known: dict[str, Any] = {}
+        self._busy = False
+
+    @property
+    def handlers(self) -> dict[str, Callable[..., Any]]:
+        """For the control socket."""
+        return {
+            "calibrate/floor": self.floor,
+            "calibrate/heading": self.heading,
+            "calibrate/body": self.body,
+            "calibrate/mount": self.mount,
+        }
+
+    async def floor(self, user: str | None = None) -> FloorCalibration:
+        """The floor's height. Raises ControlError, as all of them."""
+        found: FloorCalibration = await self._run(user, lambda: FloorFlow(self._settings, self._mount))
+        return found
+
+    async def heading(self, user: str | None = None) -> HeadingCalibration:
+        """Forward, and the IMUs' yaw."""
+        found: HeadingCalibration = await self._run(user, lambda: HeadingFlow(self._settings))
+        return found
+
+    async def body(self, user: str | None = None, height: Height | None = None) -> BodyCalibration:
+        """The person's measures; ``height`` m, standing, if it is known."""
+        found: BodyCalibration = await self._run(user, lambda: BodyFlow(self._settings, height, self._floor))
+        return found
+
+    async def mount(self, user: str | None = None) -> MountCalibration:
+        """The camera's mount on the headset."""
+        found: MountCalibration = await self._run(user, lambda: MountFlow(self._settings))
+        return found
+
+    async def run(self) -> None:
+        """Publish what is known, every 5 s, until cancelled."""
+        await self._publisher.ready()
+        while True:
+            self._recall()
+            for body in self._known.values():
+                self._publish(body)
+            await asyncio.sleep(REPEAT_S)
+
+    @property
+    def _floor(self) -> float:
+        found = self._known.get("floor")
+        return found.values.height if isinstance(found, FloorCalibration) else 0.0
+
+    @property
+    def _mount(self) -> Any:
+        found = self._known.get("mount")
+        return found.values if isinstance(found, MountCalibration) else None
+
+    async def _run(self, user: str | None, make: Callable[[], Flow]) -> Any:
+        if user is not None and user != self._settings.user:
+            raise ControlError(Code.UNAVAILABLE, f"this service is {self._settings.user!r}'s, not {user!r}'s")
+        if self._busy:
+            raise ControlError(Code.BUSY, "a calibration is under way already")
+        self._busy = True
+        try:
+            self._recall()
+            found = await self._watch(make())
+        except Refused as refused:
+            raise ControlError(refused.code, refused.message) from None
+        finally:
+            self._busy = False
+        self._known[_name(found)] = found
+        self._publish(found)
+        if self._store is not None:
+            try:
+                self._store.keep(found)
+            except StoreError as error:
+                _log.warning("the calibration counts until the service ends: %s", error)
+                self._store = None
+        return found
+
+    async def _watch(self, flow: Flow) -> Any:
+        subscriber = self._bus.subscriber([f"{self._settings.user}/{stream}" for stream in flow.streams])
+        try:
+            await subscriber.ready()
+            flow.begin(self._bus.clock())
+            while flow.found is None:
+                for received in subscriber.drain():
+                    flow.take(received.message, received.arrival)
+                flow.tick(self._bus.clock())
+                await asyncio.sleep(0.0 if subscriber.pending else LOOK_S)
+            return flow.found
+        finally:
+            subscriber.close()
+
+    def _recall(self) -> None:
+        # Each time anew: `calibrate imu` keeps what it finds from a process of its own.
+        for body in [] if self._store is None else self._store.load():
+            if not isinstance(body, BodyCalibration) or self._in_use(body):
+                self._known[_name(body)] = body
+
+    def _in_use(self, body: BodyCalibration) -> bool:
+        # A measure that a flag or the environment sets is stronger than the one that was kept.
+        return "body" in self._known or Skeleton.of(self._settings.body) == Skeleton.calibrated(body.values)
+
+    def _publish(self, body: Any) -> None:
+        self._publisher.publish(self._settings.user, "calibration", self._bus.clock(), body)
+
+
+def _name(body: Any) -> str:
+    return f"imu/{body.values.side}" if isinstance(body, ImuCalibration) else str(body.kind)
