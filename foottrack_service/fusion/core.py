@@ -5,6 +5,7 @@ The same messages at the same instants give the same results to the bit, so a re
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -40,9 +41,14 @@ _MOST_DISTANCE = 1000.0
 
 
 class FusionCore:
-    """Fuses one user's measurements into ``pose/body``, and what follows from it: ``pose/ik`` and ``gait/*``."""
+    """Fuses one user's measurements into ``pose/body``, and what follows from it: ``pose/ik`` and ``gait/*``.
 
-    def __init__(self, settings: Settings, sid: str = "offline") -> None:
+    ``sink`` hears of each result as soon as it is known, so that a pose is on its way before the gait is computed; the
+    same results are returned.
+    """
+
+    def __init__(self, settings: Settings, sid: str = "offline", sink: Callable[[Message], Any] | None = None) -> None:
+        self._sink = sink
         self._user = settings.user
         self._sid = sid
         self._body = BodySolver(Skeleton.of(settings.body), settings.body.solver)
@@ -172,9 +178,10 @@ class FusionCore:
             left=self._foot_pose("left", feet.get("left"), legs),
             right=self._foot_pose("right", feet.get("right"), legs),
         )
+        pose = self._message("pose/body", now, now, body)
         gait = self._gait.update(now, feet.get("left"), feet.get("right"), head)
         return [
-            self._message("pose/body", now, now, body),
+            pose,
             self._message("pose/ik", now, now, gait.ik),
             self._message("gait/state", now, now, gait.state),
             *(self._message("gait/event", t, now, event) for t, event in gait.events),
@@ -198,7 +205,10 @@ class FusionCore:
     def _message(self, stream: str, t: int, now: int, body: Any) -> Message:
         seq = self._seq.get(stream, 0)
         self._seq[stream] = seq + 1
-        return Message(self._user, stream, SOURCE, self._sid, seq, t, now, True, body)
+        message = Message(self._user, stream, SOURCE, self._sid, seq, t, now, True, body)
+        if self._sink is not None:
+            self._sink(message)
+        return message
 
 
 def _vec(v: Array) -> tuple[float, float, float]:

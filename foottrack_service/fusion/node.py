@@ -14,47 +14,59 @@ from foottrack_service.config import Settings
 from foottrack_service.fusion.core import SOURCE, FusionCore
 
 _HEALTH_PERIOD_NS = 500_000_000
+_IDLE_NS = 20_000_000
 _INPUTS = (Role.MEASUREMENT, Role.CALIBRATION)
 
 
 async def run(bus: Bus, settings: Settings) -> None:
     """Fuse what arrives for the settings' user until cancelled."""
-    core = FusionCore(settings, sid=uuid.uuid4().hex[:12])
     publisher = bus.publisher(SOURCE)
     subscriber = bus.subscriber(
         [f"{settings.user}/{topic.stream}" for topic in TOPICS.values() if topic.role in _INPUTS]
     )
     await publisher.ready()
     await subscriber.ready()
+    live = _LiveCore(bus, settings, publisher)
     bus.health.node(SOURCE, "running")
     async with asyncio.TaskGroup() as tasks:
-        tasks.create_task(_timer(bus, core, publisher))
-        await subscriber.deliver(lambda batch: _fuse(bus, core, publisher, batch))
+        tasks.create_task(live.timer())
+        await subscriber.deliver(live.fuse)
 
 
-def _fuse(bus: Bus, core: FusionCore, publisher: Publisher, batch: list[Received]) -> None:
-    for received in batch:
-        results = core.handle(received.message, bus.clock())
-        if results:
-            _send(publisher, results)
-            if received.message.stream.startswith("imu/"):
-                bus.health.latency(bus.clock() - received.message.data.t_arr)
+class _LiveCore:
+    """The core, its results published as they come, and how long an IMU's sample took to become a pose."""
 
+    def __init__(self, bus: Bus, settings: Settings, publisher: Publisher) -> None:
+        self._bus = bus
+        self._publisher = publisher
+        self._core = FusionCore(settings, uuid.uuid4().hex[:12], self._send)
+        self._sampled: int | None = None
 
-async def _timer(bus: Bus, core: FusionCore, publisher: Publisher) -> None:
-    reported = 0
-    while True:
-        now = bus.clock()
-        _send(publisher, core.tick(now))
-        if now - reported > _HEALTH_PERIOD_NS:
-            reported = now
-            for name, health in core.health.items():
-                bus.health.filter(name, health.accepted, health.rejected)
-        deadline = core.deadline
-        wait_ns = 5_000_000 if deadline is None else deadline - bus.clock()
-        await asyncio.sleep(max(wait_ns, 1_000_000) * 1e-9)
+    def fuse(self, batch: list[Received]) -> None:
+        """Take what arrived."""
+        clock, core = self._bus.clock, self._core
+        for received in batch:
+            message = received.message
+            self._sampled = message.data.t_arr if message.stream.startswith("imu/") else None
+            core.handle(message, clock())
 
+    async def timer(self) -> None:
+        """Publish in silence, and say how the filters are."""
+        clock, core = self._bus.clock, self._core
+        reported = 0
+        while True:
+            now = clock()
+            self._sampled = None
+            core.tick(now)
+            if now - reported > _HEALTH_PERIOD_NS:
+                reported = now
+                for name, health in core.health.items():
+                    self._bus.health.filter(name, health.accepted, health.rejected)
+            deadline = core.deadline
+            wait_ns = _IDLE_NS if deadline is None else deadline - clock()
+            await asyncio.sleep(max(wait_ns, 1_000_000) * 1e-9)
 
-def _send(publisher: Publisher, messages: list[Message]) -> None:
-    for message in messages:
-        publisher.send(message)
+    def _send(self, result: Message) -> None:
+        self._publisher.send(result)
+        if self._sampled is not None and result.stream == "pose/body":
+            self._bus.health.latency(self._bus.clock() - self._sampled)
