@@ -20,6 +20,7 @@ from foottrack_service.bus.session import SessionInfo, publish_session
 from foottrack_service.calibration.node import CalibrationDesk
 from foottrack_service.calibration.store import Store
 from foottrack_service.config import Settings
+from foottrack_service.curve_settings import Role
 from foottrack_service.fusion import node as fusion_node
 from foottrack_service.headset import node as headset_node
 from foottrack_service.imu import node as imu_node
@@ -118,6 +119,12 @@ class Service:
     def endpoints(self) -> Any:
         """Where the bus listens: BusSettings with the actual ports."""
         return self._endpoints
+
+    @property
+    def encrypted_endpoints(self) -> dict[Role, str]:
+        """Where clients with keys of other hosts connect, by role; empty without ``[bus.curve] listen``."""
+        doorkeeper = self._broker.doorkeeper
+        return {} if doorkeeper is None else dict(doorkeeper.endpoints)
 
     def start(self, node: Node) -> asyncio.Task[None]:
         """Run a node beside the others; a device node that fails is started again with a growing pause."""

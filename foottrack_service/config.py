@@ -21,6 +21,7 @@ from foottrack_protocol.frames import TAG_ON_INSTEP
 from foottrack_protocol.messages import Float, Quat, Side, Vec3
 from foottrack_protocol.topics import DEFAULT_USER, is_user
 from foottrack_service.camera.settings import SourceSettings
+from foottrack_service.curve_settings import CurveSettings
 from foottrack_service.gait.settings import GaitSettings
 from foottrack_service.headset.settings import HeadsetSettings
 from foottrack_service.imu.settings import ImuSettings
@@ -153,11 +154,12 @@ class FusionSettings(Section):
 
 
 class BusSettings(Section):
-    """Where the bus listens. Loopback only."""
+    """Where the bus listens: on loopback only, and encrypted elsewhere."""
 
     ingress: str = "tcp://127.0.0.1:7701"
     egress: str = "tcp://127.0.0.1:7702"
     control: str = "tcp://127.0.0.1:7703"
+    curve: CurveSettings = CurveSettings()
 
     @classmethod
     def beginning_at(cls, where: str) -> BusSettings:

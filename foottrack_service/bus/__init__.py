@@ -11,6 +11,7 @@ from foottrack_service.bus.errors import (
     BusError,
     ControlError,
     ControlTimeout,
+    KeyFileError,
     NotReady,
 )
 from foottrack_service.bus.publisher import Publisher
@@ -27,6 +28,7 @@ __all__ = [
     "ControlError",
     "ControlServer",
     "ControlTimeout",
+    "KeyFileError",
     "ManualClock",
     "NotReady",
     "Publisher",

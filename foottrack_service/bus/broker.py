@@ -18,6 +18,7 @@ from typing import Self
 import zmq
 
 from foottrack_protocol.topics import WELCOME
+from foottrack_service.bus.door import Doorkeeper
 from foottrack_service.bus.endpoints import HWM, MAX_FRAME_BYTES, Context, Socket, bind, release
 from foottrack_service.bus.errors import BusError
 from foottrack_service.config import BusSettings
@@ -35,6 +36,7 @@ class Broker:
 
     ``endpoints`` are the actual ones after ``start`` (port 0 takes a free one); ``inproc`` are those for tasks of
     the same ``context``, which save the way through TCP. The control endpoint in both is the configured one.
+    Where the settings say so, a ``doorkeeper`` opens encrypted endpoints beside the plain ones.
     A context of its own ends with ``stop``: close what was made of it before.
     """
 
@@ -45,12 +47,13 @@ class Broker:
         self.inproc = settings.model_copy(
             update={"ingress": f"inproc://{name}/ingress", "egress": f"inproc://{name}/egress"}
         )
+        self.doorkeeper = Doorkeeper(self.context, settings.curve) if settings.curve.listen else None
         self._own_context = context is None
         self._steering = f"inproc://{name}/steering"
         self._threads: list[threading.Thread] = []
 
     def start(self) -> None:
-        """Bind and forward. Raises BindRefused (not loopback), BindFailed (taken or malformed)."""
+        """Bind and forward. Raises BindRefused (in the clear, not loopback), BindFailed (taken or malformed)."""
         if self._threads:
             raise BusError("this broker was started before; make a new one")
         ingress, egress, steering = (self._socket(kind) for kind in (zmq.XSUB, zmq.XPUB, zmq.PAIR))
@@ -66,11 +69,18 @@ class Broker:
             bind(ingress, self.inproc.ingress)
             bind(egress, self.inproc.egress)
             bind(steering, self._steering)
+            encrypted: tuple[str, ...] = ("", "")
+            if self.doorkeeper is not None:
+                self.doorkeeper.start()
+                encrypted = (self.doorkeeper.bind(ingress, "publish"), self.doorkeeper.bind(egress, "subscribe"))
         except BusError:
             for socket in (ingress, egress, steering):
                 socket.close(0)
+            if self.doorkeeper is not None:
+                self.doorkeeper.stop()
             raise
         self.endpoints = self.endpoints.model_copy(update=actual)
+        self._bound = ((actual["ingress"], encrypted[0]), (actual["egress"], encrypted[1]))
         # Before the proxy runs, so that no publisher meets an ingress that does not want everything.
         for _ in range(_HOLD):
             ingress.send(SUBSCRIBE_ALL)
@@ -92,6 +102,8 @@ class Broker:
             steering.close(0)
             if any(thread.is_alive() for thread in self._threads):
                 raise BusError(f"the bus did not stop within {_STOP_TIMEOUT_S:g} s")
+        if self.doorkeeper is not None:
+            self.doorkeeper.stop()
         if self._own_context and not self.context.closed:
             self.context.term()
 
@@ -114,8 +126,8 @@ class Broker:
     def _proxy(self, ingress: Socket, egress: Socket, steering: Socket) -> None:
         with contextlib.suppress(zmq.ContextTerminated):
             zmq.proxy_steerable(ingress, egress, None, steering)
-            release(ingress, self.endpoints.ingress)
-            release(egress, self.endpoints.egress)
+            release(ingress, *self._bound[0])
+            release(egress, *self._bound[1])
         for socket in (ingress, egress, steering):
             socket.close(0)
 

@@ -14,6 +14,7 @@ from foottrack_service.bus.control_client import ControlClient
 from foottrack_service.bus.endpoints import Context
 from foottrack_service.bus.health import HealthBoard
 from foottrack_service.bus.publisher import Publisher
+from foottrack_service.bus.security import credentials
 from foottrack_service.bus.subscriber import Subscriber
 from foottrack_service.bus.timesync import SyncedClock
 from foottrack_service.config import BusSettings
@@ -32,29 +33,33 @@ class Bus:
         self.clock = clock
         self.health = HealthBoard()
         self._own_context = own_context
+        self._credentials = credentials(settings.curve)
         self._made: list[Publisher | Subscriber | ControlClient] = []
 
     @classmethod
     def connect(cls, settings: BusSettings, context: Context | None = None, clock: BusClock = now) -> Self:
-        """Never waits: what it makes has ``ready``. A ``SyncedClock`` that is not fresh makes messages invalid."""
+        """Never waits: what it makes has ``ready``. A ``SyncedClock`` that is not fresh makes messages invalid.
+
+        Raises KeyFileError where connections are to be encrypted.
+        """
         return cls(settings, context or zmq.Context(), context is None, clock)
 
     def publisher(self, src: str) -> Publisher:
         """A source of messages called ``src``."""
         healthy = self.clock.fresh if isinstance(self.clock, SyncedClock) else None
-        publisher = Publisher(self.context, self.settings.ingress, src, self.clock, healthy)
+        publisher = Publisher(self.context, self.settings.ingress, src, self.clock, healthy, self._credentials)
         self._made.append(publisher)
         return publisher
 
     def subscriber(self, topics: Iterable[str] = ("",), policy: Policy = Policy.EVERY) -> Subscriber:
         """Messages whose topic begins with one of ``topics``."""
-        subscriber = Subscriber(self.context, self.settings.egress, topics, policy, self.clock)
+        subscriber = Subscriber(self.context, self.settings.egress, topics, policy, self.clock, self._credentials)
         self._made.append(subscriber)
         return subscriber
 
     def control(self) -> ControlClient:
         """Requests to the service."""
-        client = ControlClient(self.context, self.settings.control)
+        client = ControlClient(self.context, self.settings.control, self._credentials)
         self._made.append(client)
         return client
 

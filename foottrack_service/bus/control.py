@@ -16,6 +16,7 @@ from foottrack_protocol.envelope import pack_map, unpack_map
 from foottrack_protocol.errors import DecodeError, EncodeError
 from foottrack_protocol.messages import Health, Session
 from foottrack_service.bus.clock import BusClock, now
+from foottrack_service.bus.door import Doorkeeper
 from foottrack_service.bus.endpoints import HWM, MAX_FRAME_BYTES, Context, bind, release
 from foottrack_service.bus.errors import BusError, ControlError
 from foottrack_service.bus.health import HealthBoard
@@ -49,8 +50,9 @@ class ControlServer:
         session: SessionInfo | None = None,
         board: HealthBoard | None = None,
         clock: BusClock = now,
+        doorkeeper: Doorkeeper | None = None,
     ) -> None:
-        """Bind; ``endpoint`` then is the actual one. Raises BindRefused, BindFailed."""
+        """Bind, also where the doorkeeper says; ``endpoint`` then is the actual one. Raises BindRefused, BindFailed."""
         session, board = session or SessionInfo(clock=clock), board or HealthBoard()
 
         def hello() -> Session:
@@ -71,6 +73,9 @@ class ControlServer:
         self._socket.setsockopt(zmq.MAXMSGSIZE, MAX_FRAME_BYTES)
         try:
             self.endpoint = bind(self._socket, endpoint)
+            self._bound = [self.endpoint]
+            if doorkeeper is not None:
+                self._bound.append(doorkeeper.bind(self._socket, "control"))
         except BusError:
             self._socket.close(0)
             raise
@@ -92,7 +97,7 @@ class ControlServer:
         """Close the socket, and with it the port; ``run`` ends when its handlers have."""
         if not self._socket.closed:
             self._watch.close()
-            release(self._socket, self.endpoint)
+            release(self._socket, *self._bound)
             self._socket.close(0)
 
     def _take(self, frames: list[bytes], tasks: asyncio.TaskGroup) -> None:

@@ -13,23 +13,24 @@ from foottrack_protocol.envelope import pack_map, unpack_map
 from foottrack_protocol.errors import DecodeError
 from foottrack_service.bus.endpoints import Context
 from foottrack_service.bus.errors import ControlError, ControlTimeout
+from foottrack_service.bus.security import Credentials, connect, why_not
 from foottrack_service.bus.watch import SocketWatch
 
 
 class ControlClient:
     """Asks the service, one request at a time. Belongs to one event loop."""
 
-    def __init__(self, context: Context, endpoint: str) -> None:
+    def __init__(self, context: Context, endpoint: str, credentials: Credentials | None = None) -> None:
         self.endpoint = endpoint
+        self._context = context
+        self._credentials = credentials
         self._numbers = itertools.count()
         self._turn = asyncio.Lock()
         self._socket = context.socket(zmq.DEALER)
         self._socket.setsockopt(zmq.LINGER, 0)
         # Without a connection nothing is sent: a command that waits would be obeyed long after its sender gave up.
         self._socket.setsockopt(zmq.IMMEDIATE, 1)
-        if "[" in endpoint:
-            self._socket.setsockopt(zmq.IPV6, 1)
-        self._socket.connect(endpoint)
+        connect(self._socket, endpoint, credentials)
         self._watch = SocketWatch(self._socket)
 
     async def request(self, cmd: str, args: Mapping[str, Any] | None = None, timeout_s: float = 2.0) -> Any:
@@ -39,9 +40,8 @@ class ControlClient:
             async with asyncio.timeout(timeout_s), self._turn:
                 answer = await self._exchange(payload)
         except TimeoutError:
-            raise ControlTimeout(
-                f"no answer to {cmd!r} from {self.endpoint} within {timeout_s:g} s: is the service running?"
-            ) from None
+            reason = await asyncio.to_thread(why_not, self._context, self.endpoint, zmq.DEALER, self._credentials)
+            raise ControlTimeout(f"no answer to {cmd!r} within {timeout_s:g} s: {reason}") from None
         return _result(answer)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Where sockets may be bound: loopback only."""
+"""Where sockets may be bound: in the clear on loopback only."""
 
 from __future__ import annotations
 
@@ -33,14 +33,18 @@ def check_loopback(endpoint: str) -> None:
     if transport != "tcp" or not _is_loopback(host):
         raise BindRefused(
             f"will not bind {endpoint}: whoever reaches the bus can read where a person's feet and head are and "
-            "publish false poses, and connections are neither encrypted nor authenticated yet. "
-            "Use a loopback address, as in tcp://127.0.0.1:7701"
+            "publish false poses, and connections there are neither encrypted nor authenticated. "
+            "Use a loopback address, as in tcp://127.0.0.1:7701, and [bus.curve] listen for other hosts"
         )
 
 
-def bind(socket: Socket, endpoint: str) -> str:
-    """Bind, and say the actual endpoint (port 0 and ``*`` take a free one). Raises BindRefused, BindFailed."""
-    check_loopback(endpoint)
+def bind(socket: Socket, endpoint: str, encrypted: bool = False) -> str:
+    """Bind, and say the actual endpoint (port 0 and ``*`` take a free one). Raises BindFailed.
+
+    Raises BindRefused where others could reach it, unless the socket's connections are ``encrypted``.
+    """
+    if not encrypted:
+        check_loopback(endpoint)
     if "[" in endpoint:
         socket.setsockopt(zmq.IPV6, 1)
     try:
@@ -52,13 +56,16 @@ def bind(socket: Socket, endpoint: str) -> str:
     return str(actual.rstrip(b"\x00").decode())
 
 
-def release(socket: Socket, endpoint: str) -> None:
-    """Unbind, and wait until the port is free: libzmq closes it in a thread of its own."""
-    if not endpoint.startswith("tcp://"):
+def release(socket: Socket, *endpoints: str) -> None:
+    """Unbind, and wait until the ports are free: libzmq closes them in a thread of its own."""
+    bound = [endpoint for endpoint in endpoints if endpoint.startswith("tcp://")]
+    if not bound:
         return
     monitor = socket.get_monitor_socket(zmq.EVENT_CLOSED)
-    socket.unbind(endpoint)
-    monitor.poll(_RELEASE_TIMEOUT_MS)
+    for endpoint in bound:
+        socket.unbind(endpoint)
+        if monitor.poll(_RELEASE_TIMEOUT_MS):
+            monitor.recv_multipart()
     socket.disable_monitor()
     monitor.close(0)
 

@@ -5,6 +5,7 @@
     BusError
     ├── BindRefused      the endpoint is not on loopback
     ├── BindFailed       the endpoint is malformed or taken
+    ├── KeyFileError     a key file is missing, unfit, or open to others
     ├── NotReady         nothing answered at the other end in time
     └── ControlError     the service answered a request with an error; ``code`` says which
         └── ControlTimeout   the service did not answer at all
@@ -23,6 +24,10 @@ class BindRefused(BusError):
 
 class BindFailed(BusError):
     """The endpoint cannot be bound."""
+
+
+class KeyFileError(BusError):
+    """A key file cannot be used or written."""
 
 
 class NotReady(BusError):

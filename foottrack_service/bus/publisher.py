@@ -14,8 +14,10 @@ import zmq
 from foottrack_protocol.envelope import Message, encode
 from foottrack_service.bus.broker import SUBSCRIBE_ALL, UNSUBSCRIBE_ALL
 from foottrack_service.bus.clock import BusClock, now
+from foottrack_service.bus.demand import Demand
 from foottrack_service.bus.endpoints import HWM, Context, Socket
 from foottrack_service.bus.errors import NotReady
+from foottrack_service.bus.security import Credentials, connect, why_not
 from foottrack_service.bus.watch import SocketWatch
 
 NO_BUS = "no_bus"
@@ -40,6 +42,7 @@ class Publisher:
         src: str,
         clock: BusClock = now,
         healthy: Callable[[], bool] | None = None,
+        credentials: Credentials | None = None,
     ) -> None:
         """``healthy`` false marks all messages ``valid: false``: a party on another host without a fresh offset."""
         self.src = src
@@ -47,12 +50,15 @@ class Publisher:
         self.sent = 0
         self.drops: Counter[str] = Counter()
         self.connections = 0
+        self._context = context
         self._endpoint = endpoint
+        self._credentials = credentials
         self._clock = clock
         self._healthy = healthy
         self._seq: dict[tuple[str, str], int] = {}
         self._live = False
-        self._socket = _socket(context, endpoint)
+        self._demand = Demand()
+        self._socket = _socket(context, endpoint, credentials)
         self._watch = SocketWatch(self._socket)
 
     @property
@@ -68,7 +74,7 @@ class Publisher:
                 while not self.live:
                     await self._watch.readable()
         except TimeoutError:
-            raise NotReady(f"no bus answers at {self._endpoint}: is the service running?") from None
+            raise NotReady(await asyncio.to_thread(self._why_not)) from None
 
     def wait_ready(self, timeout_s: float = 5.0) -> None:
         """``ready`` without an event loop. Raises NotReady."""
@@ -76,7 +82,12 @@ class Publisher:
         while not self.live:
             left_ms = int((deadline - time.monotonic()) * 1000)
             if left_ms <= 0 or not self._socket.poll(left_ms):
-                raise NotReady(f"no bus answers at {self._endpoint}: is the service running?")
+                raise NotReady(self._why_not())
+
+    def wanted(self, user: str, stream: str) -> bool:
+        """Whether somebody asks for a raw stream: only then it is published."""
+        self._notice()
+        return self._live and self._demand.wants(f"{user}/{stream}")
 
     def publish(
         self, user: str, stream: str, t: int, data: Any, valid: bool = True, t_pub: int | None = None
@@ -122,6 +133,9 @@ class Publisher:
             self._watch.close()
             self._socket.close(int(linger_s * 1000))
 
+    def _why_not(self) -> str:
+        return why_not(self._context, self._endpoint, zmq.XPUB, self._credentials)
+
     def _notice(self) -> None:
         while self._watch.has_input:
             # Frame by frame: what subscribers send comes up too, and a longer message may lack its end.
@@ -131,16 +145,16 @@ class Publisher:
                 self.connections += 1
             elif frame == UNSUBSCRIBE_ALL:
                 self._live = False
+            else:
+                self._demand.notice(frame)
 
 
-def _socket(context: Context, endpoint: str) -> Socket:
+def _socket(context: Context, endpoint: str, credentials: Credentials | None) -> Socket:
     socket = context.socket(zmq.XPUB)
     socket.set_hwm(HWM)
     # The pipe ends with the connection, which the socket reports as the bus's unsubscription. With the pipe kept,
     # 10,000 old samples would be held back and burst onto a bus that comes back.
     socket.setsockopt(zmq.IMMEDIATE, 1)
     socket.setsockopt(zmq.XPUB_NODROP, 1)
-    if "[" in endpoint:
-        socket.setsockopt(zmq.IPV6, 1)
-    socket.connect(endpoint)
+    connect(socket, endpoint, credentials)
     return socket

@@ -17,6 +17,7 @@ from foottrack_protocol.topics import WELCOME, Policy
 from foottrack_service.bus.clock import BusClock, now
 from foottrack_service.bus.endpoints import HWM, MAX_FRAME_BYTES, Context, Socket
 from foottrack_service.bus.errors import NotReady
+from foottrack_service.bus.security import Credentials, connect, why_not
 from foottrack_service.bus.sequence import Stats
 from foottrack_service.bus.watch import SocketWatch
 
@@ -51,16 +52,19 @@ class Subscriber:
         topics: Iterable[str] = ("",),
         policy: Policy = Policy.EVERY,
         clock: BusClock = now,
+        credentials: Credentials | None = None,
     ) -> None:
         self.policy = policy
         self.stats = Stats()
         self.connections = 0
+        self._context = context
         self._endpoint = endpoint
+        self._credentials = credentials
         self._clock = clock
         self._token = b""
         self._early: list[Received] = []
         self._last_log: int | None = None
-        self._socket = _socket(context, endpoint, topics)
+        self._socket = _socket(context, endpoint, topics, credentials)
         self._watch = SocketWatch(self._socket)
 
     async def ready(self, timeout_s: float = 5.0) -> None:
@@ -70,7 +74,7 @@ class Subscriber:
                 while not self._greeted():
                     await self._watch.readable()
         except TimeoutError:
-            raise NotReady(f"no bus answers at {self._endpoint}: is the service running?") from None
+            raise NotReady(await asyncio.to_thread(self._why_not)) from None
 
     def wait_ready(self, timeout_s: float = 5.0) -> None:
         """``ready`` without an event loop. Raises NotReady."""
@@ -78,7 +82,7 @@ class Subscriber:
         while not self._greeted():
             left_ms = int((deadline - time.monotonic()) * 1000)
             if left_ms <= 0 or not self._socket.poll(left_ms):
-                raise NotReady(f"no bus answers at {self._endpoint}: is the service running?")
+                raise NotReady(self._why_not())
 
     @property
     def pending(self) -> bool:
@@ -149,11 +153,18 @@ class Subscriber:
             for received in batch:
                 yield received
 
+    def subscribe(self, topic: str) -> None:
+        """Ask for more: messages whose topic begins with this, too. It takes a moment until the bus knows."""
+        self._socket.subscribe(topic)
+
     def close(self) -> None:
         """Close; what was not read is lost. Iterations end."""
         if not self._socket.closed:
             self._watch.close()
             self._socket.close(0)
+
+    def _why_not(self) -> str:
+        return why_not(self._context, self._endpoint, zmq.SUB, self._credentials)
 
     def _greeted(self) -> bool:
         # Messages that come before the greeting are the reader's already.
@@ -220,13 +231,11 @@ def _newest(received: Iterable[Received]) -> list[Received]:
     return list(newest.values())
 
 
-def _socket(context: Context, endpoint: str, topics: Iterable[str]) -> Socket:
+def _socket(context: Context, endpoint: str, topics: Iterable[str], credentials: Credentials | None) -> Socket:
     socket = context.socket(zmq.SUB)
     socket.set_hwm(HWM)
     socket.setsockopt(zmq.MAXMSGSIZE, MAX_FRAME_BYTES)
-    if "[" in endpoint:
-        socket.setsockopt(zmq.IPV6, 1)
     for topic in (WELCOME.decode(), *topics):
         socket.subscribe(topic)
-    socket.connect(endpoint)
+    connect(socket, endpoint, credentials)
     return socket

@@ -21,6 +21,7 @@ from foottrack_service.cli import (
     markers,
     recordings,
     running,
+    security,
     service,
     settings,
     sim,
@@ -48,6 +49,8 @@ app.command()(watch.echo)
 app.command()(evaluate.evaluate)
 app.command()(bench.bench)
 app.command()(doctor.doctor)
+app.command()(security.relay)
+app.add_typer(security.app, name="keys")
 app.add_typer(settings.app, name="config")
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(imu.app, name="imu")

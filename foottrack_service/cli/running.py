@@ -53,7 +53,7 @@ def settings_for(config: Path | None, user: str | None = None, bus: str | None =
     if user is not None:
         flags["user"] = user
     if bus is not None:
-        flags["bus"] = BusSettings.beginning_at(bus).model_dump()
+        flags["bus"] = BusSettings.beginning_at(bus).model_dump(exclude={"curve"})
     return load_calibrated(config, flags).settings
 
 

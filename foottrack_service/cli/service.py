@@ -60,6 +60,8 @@ async def _serve(settings: Settings) -> None:
             f"Listening: publishers {ends.ingress}, subscribers {ends.egress}, control {ends.control}. Ctrl-C ends it.",
             err=True,
         )
+        if service.encrypted_endpoints:
+            typer.echo(f"Encrypted: {', '.join(service.encrypted_endpoints.values())}.", err=True)
         for each in NODES.values():
             if each.wanted(settings):
                 service.start(each)
