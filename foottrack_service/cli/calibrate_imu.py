@@ -12,6 +12,7 @@ from foottrack_protocol.frames import SIDES
 from foottrack_protocol.messages import Imu, ImuCalibration, ImuValues, Side
 from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.subscriber import Subscriber
+from foottrack_service.calibration.store import Store, StoreError
 from foottrack_service.cli.running import (
     CommandFailed,
     ConfigOption,
@@ -43,6 +44,12 @@ def imu(
     """
     settings = settings_for(config, user, connect)
     result = run_loop(calibrate(settings, timeout, tap, lambda text: typer.echo(text, err=True)))
+    store = Store.at_home(settings.user, settings.feet.shoes)
+    try:
+        for values in result["imus"].values():
+            store.keep(ImuCalibration(values=ImuValues.model_validate(values)))
+    except StoreError as error:
+        raise CommandFailed(f"what was found could not be kept: {error}") from None
     if as_json:
         print_json(result)
         return
