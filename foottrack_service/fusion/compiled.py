@@ -27,6 +27,12 @@ def compiled(function: F) -> F:
         config.CACHE_DIR = before
 
 
+def is_compiled() -> bool:
+    """Whether this machine has compiled kernels of this version before."""
+    config: Any = numba.config
+    return any(Path(config.CACHE_DIR or _CACHE).rglob("*.nbi"))
+
+
 def _cache_folder() -> str:
     # Numba renews a function's cache when its own file changes, but not when a constant or a function that it takes
     # from another file does: so the cache is named by all files of this room that have or feed kernels.

@@ -13,6 +13,7 @@ import numpy as np
 
 from foottrack_protocol.messages import Side
 from foottrack_service.config import FootSettings, Placement
+from foottrack_service.fusion.compiled import is_compiled
 from foottrack_service.fusion.foot_filter_inertial import InertialFilter
 from foottrack_service.fusion.interface import FootEstimate, HeadSample, ImuSample, OpticalFix, Verdict
 from foottrack_service.fusion.ladder import BALL_68_OF_ONE_AXIS, Ladder
@@ -92,7 +93,8 @@ class ErrorStateFilter:
 
 def warm_up() -> None:
     """Compile the kernels, or read them from the cache, before the first sample needs them, and say so."""
-    _log.info("loading the foot filter (the first start on a machine compiles it: about half a minute)")
+    if not is_compiled():
+        _log.info("compiling the foot filter for this machine: about half a minute, this once")
     trial = ErrorStateFilter(FootSettings(), "left")
     step = 5_000_000
     for i in range(40):
@@ -101,4 +103,4 @@ def warm_up() -> None:
         p, q = np.array([-0.1, -1.55, -0.15]), np.array(FootSettings().marker.q)
         trial.on_fix(OpticalFix(head.t, "marker", p, q, None, 1e-6 * np.eye(3), 1.0, 50.0, head, head), head.t)
     trial.estimate(40 * step)
-    _log.info("the foot filter is ready")
+    _log.debug("the foot filter is ready")
