@@ -78,6 +78,7 @@ class RecordStart(Body):
     """A new recording."""
 
     name: RecordingName = Field(description="without folder and ending")
+    raw: Bool = Field(default=False, description="with the sensors' own bytes and pictures")
 
 
 class RecordingFile(Body):

@@ -18,7 +18,7 @@ from foottrack_protocol.envelope import PROTOCOL_MAJOR, PROTOCOL_MINOR
 from foottrack_protocol.golden import invalid, valid
 from foottrack_protocol.schemas import body_schema, envelope_schema
 from foottrack_protocol.tables import TABLES
-from foottrack_protocol.topics import SYSTEM_TOPICS, TOPICS
+from foottrack_protocol.topics import RAW_PREFIX, SYSTEM_TOPICS, TOPICS
 
 COMMAND = "python -m foottrack_protocol.generate"
 FOLDER = Path(__file__).resolve().parents[1]
@@ -48,9 +48,17 @@ def files(spec: str) -> dict[str, str]:
             if model.__module__ == control.__name__:
                 found[f"schema/control/{_snake(model.__name__)}.json"] = _json(body_schema(model))
     for name, goldens in valid.by_body().items():
-        found[f"vectors/{name}.json"] = _vectors([valid.as_json(golden) for golden in goldens])
+        folder = RAW_PREFIX if _is_raw(goldens[0].topic) else ""
+        found[f"vectors/{folder}{name}.json"] = _vectors([valid.as_json(golden) for golden in goldens])
     found["vectors/envelope.json"] = _vectors([valid.as_json(golden) for golden in valid.of_envelope()])
-    found["vectors/invalid.json"] = _vectors([invalid.as_json(refused) for refused in invalid.refused()])
+    for folder in ("", RAW_PREFIX):
+        found[f"vectors/{folder}invalid.json"] = _vectors(
+            [
+                invalid.as_json(refused)
+                for refused in invalid.refused()
+                if _is_raw(refused.frames[0].decode(errors="replace") if refused.frames else "") == bool(folder)
+            ]
+        )
     return found
 
 
@@ -113,6 +121,10 @@ def main() -> int:
         print(f"Run: {COMMAND}", file=sys.stderr)
         return 1
     return 0
+
+
+def _is_raw(topic: str) -> bool:
+    return topic.partition("/")[2].startswith(RAW_PREFIX)
 
 
 def _left_over(folder: Path, wanted: dict[str, str]) -> list[str]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, PlainSerializer, model_validator
+from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, model_validator
 from pydantic.types import Strict
 
 from foottrack_protocol.values import (
     Acceleration,
     Angle,
     AngularRate,
+    Bin,
     Body,
     Bool,
     Coordinate,
@@ -27,10 +27,6 @@ from foottrack_protocol.values import (
     Side,
     Str,
 )
-
-
-def _base64(value: bytes) -> str:
-    return b64encode(value).decode()
 
 
 def _given(key: str) -> dict[str, Any]:
@@ -223,10 +219,4 @@ Calibration = Annotated[
 class CameraPreview(Body):
     """A picture with what was found drawn in. Off unless asked for."""
 
-    jpeg: Annotated[
-        bytes,
-        Strict(),
-        # pydantic's own base64 is the one for URLs, which JSON Schema does not mean.
-        PlainSerializer(_base64, when_used="json"),
-        Field(json_schema_extra={"contentEncoding": "base64"}),
-    ]
+    jpeg: Bin

@@ -21,6 +21,7 @@ from foottrack_protocol.measurements import (
     PerSideYaw,
     Truth,
 )
+from foottrack_protocol.raw import Lens, RawImu, RawPicture
 from foottrack_protocol.results import (
     BodyPose,
     FootGait,
@@ -50,6 +51,7 @@ from foottrack_protocol.values import (
     Acceleration,
     Angle,
     AngularRate,
+    Bin,
     Body,
     Bool,
     Coordinate,
@@ -86,6 +88,7 @@ __all__ = [
     "Acceleration",
     "Angle",
     "AngularRate",
+    "Bin",
     "Body",
     "BodyCalibration",
     "BodyPose",
@@ -120,6 +123,7 @@ __all__ = [
     "Int",
     "Latency",
     "Length",
+    "Lens",
     "LogRecord",
     "MountCalibration",
     "MountValues",
@@ -134,6 +138,8 @@ __all__ = [
     "Position",
     "ProtocolVersion",
     "Quat",
+    "RawImu",
+    "RawPicture",
     "Seconds",
     "Session",
     "Side",

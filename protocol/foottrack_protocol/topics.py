@@ -19,6 +19,9 @@ SYSTEM = "sys"
 WELCOME = b"sys/welcome"
 """What the egress socket says to a new subscriber: with ``sys/welcome/<token>`` the only message of one frame."""
 
+RAW_PREFIX = "raw/"
+"""How streams begin that are only published while somebody subscribes to them by name: to so much of it at least."""
+
 _USER = re.compile(USER_PATTERN)
 
 
@@ -37,6 +40,7 @@ class Role(StrEnum):
     CALIBRATION = "calibration"
     RESULT = "result"
     PICTURE = "picture"
+    RAW = "raw"
     SYSTEM = "system"
 
 
@@ -84,6 +88,11 @@ _ALL = [
     *_both("truth", m.Truth, Role.REFERENCE, 100.0, "reference system", "truth"),
     Topic("calibration", m.Calibration, Role.CALIBRATION, Policy.EVERY, 0.2, True, "calibration", "calibration"),
     Topic("camera/preview", m.CameraPreview, Role.PICTURE, Policy.LATEST, 5.0, False, "camera", "camera_preview"),
+    *(
+        Topic(f"raw/imu/{side}", m.RawImu, Role.RAW, Policy.EVERY, None, False, f"imu-{side}", "raw_imu")
+        for side in SIDES
+    ),
+    Topic("raw/camera", m.RawPicture, Role.RAW, Policy.EVERY, None, False, "camera", "raw_picture"),
     Topic("pose/body", m.BodyPose, Role.RESULT, Policy.LATEST, 200.0, True, "fusion", "body_pose"),
     Topic("pose/ik", m.IkTargets, Role.RESULT, Policy.LATEST, 200.0, True, "fusion", "ik_targets"),
     Topic("gait/state", m.GaitState, Role.RESULT, Policy.LATEST, 200.0, True, "fusion", "gait_state"),

@@ -8,10 +8,11 @@ Units are part of the types and go from there into the schemas and the specifica
 from __future__ import annotations
 
 import math
+from base64 import b64encode
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainSerializer
 from pydantic.types import Strict
 
 INT64_MIN, INT64_MAX = -(2**63), 2**63 - 1
@@ -53,6 +54,10 @@ def _semidefinite(cov: tuple[float, ...]) -> tuple[float, ...]:
     return cov
 
 
+def _base64(value: bytes) -> str:
+    return b64encode(value).decode()
+
+
 def _in(unit: str) -> Any:
     return Field(json_schema_extra={"unit": unit})
 
@@ -64,6 +69,13 @@ Int = Annotated[int, Strict(), Field(ge=INT64_MIN, le=INT64_MAX)]
 Count = Annotated[int, Strict(), Field(ge=0, le=INT64_MAX)]
 Bool = Annotated[bool, Strict()]
 Str = Annotated[str, Strict()]
+Bin = Annotated[
+    bytes,
+    Strict(),
+    # pydantic's own base64 is the one for URLs, which JSON Schema does not mean.
+    PlainSerializer(_base64, when_used="json"),
+    Field(json_schema_extra={"contentEncoding": "base64"}),
+]
 Counts = Annotated[dict[Str, Count], Field(max_length=MAX_ITEMS)]
 Vec3 = tuple[Float, Float, Float]
 

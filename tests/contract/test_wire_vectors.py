@@ -34,11 +34,11 @@ def read_schema(name: str) -> dict[str, Any]:
 
 VALID = [
     pytest.param(vector, id=f"{path.stem}: {vector['name']}")
-    for path in sorted((FOLDER / "vectors").glob("*.json"))
+    for path in sorted((FOLDER / "vectors").rglob("*.json"))
     if path.name != "invalid.json"
     for vector in vectors(path)
 ]
-INVALID = vectors(FOLDER / "vectors" / "invalid.json")
+INVALID = [vector for path in (FOLDER / "vectors").rglob("invalid.json") for vector in vectors(path)]
 BEYOND_SCHEMA = re.compile(
     "quaternion (that is|of zeros|whose)|covariance (with|that|whose)|heading that is no direction"  # geometry
     "|a float for an integer|a counter that is a float"  # 1.0 is an integer in JSON

@@ -29,6 +29,14 @@ _MARKER = {
 }
 _DEPTH = {**_MARKER, "q": None, "q_alt": None, "size_ratio": None, "reproj_px": None, "frame": 1802}
 
+_RAW_IMU = {
+    "bytes": b"\x00\x00\x00\x11\xff\xc0 no packet \x7f\x80",
+    "format": "slimevr",
+    "source": "192.168.1.20:6969",
+    "connection": 2,
+    "tracker": "A0:00:00:00:00:01/0",
+}
+
 
 def _foot(x: float, stage: str) -> dict[str, Any]:
     return {
@@ -66,6 +74,27 @@ BODIES: dict[str, dict[str, Any]] = {
     "truth/right": {"p": [0.125, 0.21875, -0.34375], "q": _TILT},
     "calibration": {"kind": "floor", "values": {"height": -0.0234375}},
     "camera/preview": {"jpeg": b"\xff\xd8\xff\xe0 no picture, but its first bytes \x00\xff\xd9"},
+    "raw/imu/left": _RAW_IMU,
+    "raw/imu/right": {**_RAW_IMU, "bytes": b"\xaa\xaa\x00", "format": "rvc", "source": "COM3", "tracker": None},
+    "raw/camera": {
+        "frame": 1803,
+        "layer": "depth",
+        "part": 1,
+        "parts": 3,
+        "png": b"no picture, but some of its bytes \x00\xff IEND\xaeB`\x82",
+        "depth_unit": 0.0009765625,
+        "exposure": 0.00390625,
+        "readout": 0.0078125,
+        "lens": {
+            "width": 848,
+            "height": 480,
+            "fx": 612.5,
+            "fy": 613.25,
+            "cx": 423.75,
+            "cy": 239.125,
+            "distortion": [0.0625, -0.1875, 0.00048828125, -0.000244140625, 0.03125],
+        },
+    },
     "pose/body": {
         "head": {"p": [0.0, 1.65625, 0.0], "q": _TILT},
         "hips": {"p": [0.0, 0.90625, 0.078125], "q": _HALF_TURN},
