@@ -14,6 +14,7 @@ import zmq
 from foottrack_protocol.envelope import Message, encode
 from foottrack_service.bus.broker import SUBSCRIBE_ALL, UNSUBSCRIBE_ALL
 from foottrack_service.bus.clock import BusClock, now
+from foottrack_service.bus.demand import Demand
 from foottrack_service.bus.endpoints import HWM, Context, Socket
 from foottrack_service.bus.errors import NotReady
 from foottrack_service.bus.security import Credentials, connect, why_not
@@ -56,6 +57,7 @@ class Publisher:
         self._healthy = healthy
         self._seq: dict[tuple[str, str], int] = {}
         self._live = False
+        self._demand = Demand()
         self._socket = _socket(context, endpoint, credentials)
         self._watch = SocketWatch(self._socket)
 
@@ -81,6 +83,11 @@ class Publisher:
             left_ms = int((deadline - time.monotonic()) * 1000)
             if left_ms <= 0 or not self._socket.poll(left_ms):
                 raise NotReady(self._why_not())
+
+    def wanted(self, user: str, stream: str) -> bool:
+        """Whether somebody asks for a raw stream: only then it is published."""
+        self._notice()
+        return self._live and self._demand.wants(f"{user}/{stream}")
 
     def publish(
         self, user: str, stream: str, t: int, data: Any, valid: bool = True, t_pub: int | None = None
@@ -138,6 +145,8 @@ class Publisher:
                 self.connections += 1
             elif frame == UNSUBSCRIBE_ALL:
                 self._live = False
+            else:
+                self._demand.notice(frame)
 
 
 def _socket(context: Context, endpoint: str, credentials: Credentials | None) -> Socket:

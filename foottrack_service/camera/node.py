@@ -13,7 +13,7 @@ from typing import Any
 
 from foottrack_protocol.messages import CameraPreview
 from foottrack_service.bus.connection import Bus
-from foottrack_service.camera.process import Ended, Fixes, Opened, Report, work
+from foottrack_service.camera.process import RAW_OFF, RAW_ON, STOP, Ended, Fixes, Opened, Picture, Report, work
 from foottrack_service.config import Settings
 
 SOURCE = "camera"
@@ -29,9 +29,9 @@ class CameraError(Exception):
 
 
 async def run(bus: Bus, settings: Settings) -> None:
-    """Publish `marker/*`, `depth/*` and, if asked for, `camera/preview`, until cancelled or the sequence ends.
+    """Publish `marker/*`, `depth/*` and, if asked for, `camera/preview` and `raw/camera`.
 
-    Raises CameraError; the service starts the node again after a pause.
+    Until cancelled or the sequence ends. Raises CameraError; the service starts the node again after a pause.
     """
     publisher = bus.publisher(SOURCE)
     await publisher.ready()
@@ -39,6 +39,7 @@ async def run(bus: Bus, settings: Settings) -> None:
     reports: asyncio.Queue[Report] = asyncio.Queue()
     reader = _read_in_thread(connection, reports)
     tally = _Tally(bus, settings.user)
+    wants_raw = False
     try:
         while True:
             report = await reports.get()
@@ -50,6 +51,12 @@ async def run(bus: Bus, settings: Settings) -> None:
                 if report.jpeg is not None:
                     publisher.publish(settings.user, "camera/preview", report.t, CameraPreview(jpeg=report.jpeg))
                 tally.add(report)
+                if wants_raw != publisher.wanted(settings.user, "raw/camera"):
+                    wants_raw = not wants_raw
+                    _order(connection, RAW_ON if wants_raw else RAW_OFF)
+            elif isinstance(report, Picture):
+                for piece in report.pieces:
+                    publisher.publish(settings.user, "raw/camera", report.t, piece)
             elif report.error is None:
                 return
             else:
@@ -132,9 +139,14 @@ def _read_in_thread(connection: Connection, reports: asyncio.Queue[Report]) -> t
     return thread
 
 
-def _stop(process: Any, connection: Connection) -> None:
+def _order(connection: Connection, order: str) -> None:
+    # Where the process is gone, its reports say so.
     with suppress(OSError):
-        connection.send("stop")
+        connection.send(order)
+
+
+def _stop(process: Any, connection: Connection) -> None:
+    _order(connection, STOP)
     process.join(_STOP_S)
     if process.is_alive():
         process.terminate()

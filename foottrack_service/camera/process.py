@@ -16,8 +16,8 @@ from typing import Any
 
 import cv2
 
-from foottrack_protocol.messages import Optical
-from foottrack_service.camera import overlay
+from foottrack_protocol.messages import Optical, RawPicture
+from foottrack_service.camera import overlay, raw
 from foottrack_service.camera.frame import Frame, Source, SourceEnded, SourceError
 from foottrack_service.camera.setup import Trackers, open_source
 from foottrack_service.config import Settings
@@ -57,7 +57,19 @@ class Ended:
     error: str | None
 
 
-Report = Opened | Fixes | Ended
+@dataclass(frozen=True)
+class Picture:
+    """A picture itself, taken at `t`, while somebody asks for it."""
+
+    t: int
+    pieces: tuple[RawPicture, ...]
+
+
+Report = Opened | Fixes | Picture | Ended
+
+STOP = "stop"
+RAW_ON, RAW_OFF = "raw on", "raw off"
+"""What the node tells the process."""
 
 
 class Watcher:
@@ -67,6 +79,7 @@ class Watcher:
         self._trackers, self._preview, self._now = trackers, preview, now
         self._number: int | None = None
         self._shown: int | None = None
+        self._shot: int | None = None
         self._seen = 0
         self._dark = False
 
@@ -89,6 +102,13 @@ class Watcher:
                 found.append((f"{fix.kind}/{fix.side}", fix.t, fix.body()))
         return Fixes(tuple(found), frame.t, dropped, len(fixes) - len(found), late, self._dark, jpeg)
 
+    def picture(self, frame: Frame) -> Picture | None:
+        """The picture itself, where one is due."""
+        if self._shot is not None and 0 <= frame.t - self._shot < raw.PERIOD_S * 1e9:
+            return None
+        self._shot = frame.t
+        return Picture(frame.t, raw.pieces(frame, self._trackers.rig.intrinsics))
+
 
 def work(connection: Connection, settings: dict[str, Any]) -> None:
     """The process's main: until told to stop, the source's end, or an error that is told first."""
@@ -103,14 +123,24 @@ def work(connection: Connection, settings: dict[str, Any]) -> None:
         trackers = Trackers(loaded.camera, source.intrinsics)
         connection.send(Opened())
         watcher = Watcher(trackers, loaded.camera.source.preview, time.perf_counter_ns)
-        # Anything that comes, the end of the pipe too, means stop.
-        while not connection.poll():
-            connection.send(watcher.report(source.read()))
+        wants_raw = False
+        while True:
+            while connection.poll():
+                order = connection.recv()
+                if order == STOP:
+                    return
+                wants_raw = order == RAW_ON
+            frame = source.read()
+            connection.send(watcher.report(frame))
+            # After the fixes, which are waited for.
+            picture = watcher.picture(frame) if wants_raw else None
+            if picture is not None:
+                connection.send(picture)
     except SourceEnded:
         _tell(connection, Ended(None))
     except (SourceError, ValueError) as error:
         _tell(connection, Ended(str(error)))
-    except (BrokenPipeError, ConnectionError):
+    except (BrokenPipeError, ConnectionError, EOFError):
         pass
     finally:
         if source is not None:

@@ -17,8 +17,9 @@ from foottrack_service.imu import ports
 from foottrack_service.imu.formats import SERIAL_FORMATS
 from foottrack_service.imu.link import SerialLink
 from foottrack_service.imu.settings import ImuDeviceSettings
-from foottrack_service.imu.slimevr import SlimeVrServer, TrackerSample
+from foottrack_service.imu.slimevr import Address, SlimeVrServer, TrackerSample
 from foottrack_service.imu.stream import SerialStream, Stamped, Stamper
+from foottrack_service.imu.tap import Tap
 from foottrack_service.imu.udp import SlimeVrSocket
 
 REPORT_S = 1.0
@@ -49,12 +50,13 @@ async def run(bus: Bus, settings: Settings) -> None:
 class _Foot:
     """One side's publisher."""
 
-    def __init__(self, bus: Bus, user: str, side: Side) -> None:
+    def __init__(self, bus: Bus, user: str, side: Side, format_: str) -> None:
         self._user = user
         self._stream = f"imu/{side}"
         self._reported: Counter[str] = Counter()
         self.name = f"imu-{side}"
         self.publisher: Publisher = bus.publisher(self.name)
+        self.tap = Tap(self.publisher, user, side, format_)
 
     def publish(self, stamped: Stamped) -> None:
         self.publisher.publish(self._user, self._stream, stamped.t, stamped.imu)
@@ -70,7 +72,7 @@ class _Foot:
 
 class _SerialFoot(_Foot):
     def __init__(self, bus: Bus, user: str, side: Side, device: ImuDeviceSettings, taken: dict[Side, str]) -> None:
-        super().__init__(bus, user, side)
+        super().__init__(bus, user, side, device.format)
         self._side = side
         self._device = device
         self._taken = taken
@@ -120,13 +122,19 @@ class _SerialFoot(_Foot):
     def _on_data(self, data: bytes, t_arr: int) -> None:
         for stamped in self._source.feed(data, t_arr):
             self.publish(stamped)
+        self.tap.publish(data, t_arr, self._link.port or "", self._link.connections)
 
 
 class _TrackerFoot(_Foot):
     def __init__(self, bus: Bus, user: str, side: Side, device: ImuDeviceSettings) -> None:
-        super().__init__(bus, user, side)
+        super().__init__(bus, user, side, device.format)
         self.wanted = None if device.port == "auto" else _tracker_name(device.port)
         self.stamper = Stamper(device, None)
+
+    @property
+    def mac(self) -> str | None:
+        """Of the tracker that is on this foot, None before that is known."""
+        return None if self.wanted is None else self.wanted.split("/")[0]
 
 
 async def _start_trackers(
@@ -139,7 +147,12 @@ async def _start_trackers(
         await foot.publisher.ready()
     imu = settings.imu
     socket = await SlimeVrSocket.open(
-        imu.slimevr_host, imu.slimevr_port, server, partial(_on_tracker_sample, feet), bus.clock
+        imu.slimevr_host,
+        imu.slimevr_port,
+        server,
+        partial(_on_tracker_sample, feet),
+        bus.clock,
+        partial(_on_datagram, feet, server),
     )
     tasks.create_task(socket.run(), name="slimevr")
     tasks.create_task(_watch_trackers(bus, server, feet), name="slimevr watch")
@@ -159,12 +172,19 @@ def _on_tracker_sample(feet: list[_TrackerFoot], sample: TrackerSample, t_arr: i
         foot.publish(stamped)
 
 
+def _on_datagram(feet: list[_TrackerFoot], server: SlimeVrServer, data: bytes, address: Address, t_arr: int) -> None:
+    name, handshake = server.introduction(address) or (None, None)
+    theirs = [foot for foot in feet if name is not None and foot.mac == name]
+    # What is nobody's may be what a foot without its tracker waits for.
+    for foot in theirs or [foot for foot in feet if foot.mac not in server.trackers]:
+        foot.tap.publish(data, t_arr, f"{address[0]}:{address[1]}", 0, foot.wanted, handshake)
+
+
 async def _watch_trackers(bus: Bus, server: SlimeVrServer, feet: list[_TrackerFoot]) -> None:
     reported: Counter[str] = Counter()
     while True:
         for foot in feet:
-            mac = (foot.wanted or "").split("/")[0]
-            if mac in server.trackers:
+            if foot.mac in server.trackers:
                 bus.health.node(foot.name, "running")
             else:
                 bus.health.node(foot.name, "starting", f"waits for tracker {foot.wanted or '(any)'}")

@@ -46,6 +46,7 @@ class _Tracker:
     name: str
     protocol: int
     heard_s: float
+    handshake: bytes
     number: int = 0
     ping: int = 0
     ping_sent_s: float = 0.0
@@ -84,7 +85,7 @@ class SlimeVrServer:
                 if tracker is None and len(self._trackers) >= MAX_TRACKERS:
                     self.drops["crowded"] += 1
                     continue
-                tracker = _Tracker(packet.mac or address[0], packet.protocol, now_s)
+                tracker = _Tracker(packet.mac or address[0], packet.protocol, now_s, datagram)
                 self._trackers[address] = tracker
                 answers.append(Answer(address, slimevr.handshake_reply()))
             elif tracker is None:
@@ -130,6 +131,11 @@ class SlimeVrServer:
     def trackers(self) -> list[str]:
         """Names of those that shook hands and live."""
         return sorted(tracker.name for tracker in self._trackers.values())
+
+    def introduction(self, address: Address) -> tuple[str, bytes] | None:
+        """Name and handshake of the tracker that talks from there; None for a stranger."""
+        tracker = self._trackers.get(address)
+        return None if tracker is None else (tracker.name, tracker.handshake)
 
     def _sample(self, tracker: _Tracker, rotation: Rotation, acceleration: Acceleration) -> TrackerSample:
         turn = self._acc_turn_rad

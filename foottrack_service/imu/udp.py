@@ -7,10 +7,13 @@ from collections.abc import Callable
 from typing import cast
 
 from foottrack_service.bus.clock import BusClock
-from foottrack_service.imu.slimevr import Answer, SlimeVrServer, TrackerSample
+from foottrack_service.imu.slimevr import Address, Answer, SlimeVrServer, TrackerSample
 
 OnSample = Callable[[TrackerSample, int], None]
 """A sample, and when it arrived (bus clock, ns)."""
+
+OnDatagram = Callable[[bytes, Address, int], None]
+"""A datagram, who sent it, and when it arrived; after its samples."""
 
 _BEAT_S = 0.1
 
@@ -18,21 +21,30 @@ _BEAT_S = 0.1
 class SlimeVrSocket(asyncio.DatagramProtocol):
     """Feeds a ``SlimeVrServer`` and sends its answers. ``port`` is where it listens."""
 
-    def __init__(self, server: SlimeVrServer, on_sample: OnSample, clock: BusClock) -> None:
+    def __init__(
+        self, server: SlimeVrServer, on_sample: OnSample, clock: BusClock, on_datagram: OnDatagram | None = None
+    ) -> None:
         self._server = server
         self._on_sample = on_sample
+        self._on_datagram = on_datagram
         self._clock = clock
         self._transport: asyncio.DatagramTransport | None = None
 
     @classmethod
     async def open(
-        cls, host: str, port: int, server: SlimeVrServer, on_sample: OnSample, clock: BusClock
+        cls,
+        host: str,
+        port: int,
+        server: SlimeVrServer,
+        on_sample: OnSample,
+        clock: BusClock,
+        on_datagram: OnDatagram | None = None,
     ) -> SlimeVrSocket:
         """Listen. Raises OSError, for instance where SlimeVR's own server has the port."""
         loop = asyncio.get_running_loop()
         try:
             _, protocol = await loop.create_datagram_endpoint(
-                lambda: cls(server, on_sample, clock), local_addr=(host, port)
+                lambda: cls(server, on_sample, clock, on_datagram), local_addr=(host, port)
             )
         except OSError as error:
             raise OSError(f"UDP {host}:{port} for SlimeVR trackers: {error.strerror or error}") from None
@@ -67,6 +79,8 @@ class SlimeVrSocket(asyncio.DatagramProtocol):
         self._send(answers)
         for sample in samples:
             self._on_sample(sample, t_arr)
+        if self._on_datagram is not None:
+            self._on_datagram(data, (addr[0], addr[1]), t_arr)
 
     def error_received(self, exc: Exception) -> None:
         """A tracker that was switched off answers with an ICMP error: its silence says the same."""

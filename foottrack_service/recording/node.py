@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import StringConstraints
 
 from foottrack_protocol.control import Code
-from foottrack_protocol.topics import split_topic
+from foottrack_protocol.topics import RAW_PREFIX, SYSTEM, Role, split_topic
 from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.endpoints import HWM
 from foottrack_service.bus.errors import ControlError
@@ -24,25 +24,41 @@ RecordingName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,100}
 
 
 async def run(
-    bus: Bus, settings: Settings, path: Path, *, on_started: Callable[[RecordingWriter], None] | None = None
+    bus: Bus,
+    settings: Settings,
+    path: Path,
+    *,
+    raw: bool = False,
+    on_started: Callable[[RecordingWriter], None] | None = None,
 ) -> WriterStats:
     """Record all users' streams, as far as the registry says so, until cancelled: then the file is closed properly.
 
+    With ``raw`` the sensors' own bytes and pictures are asked for, and recorded as well.
     ``on_started`` is called when nothing published from then on is missed. Raises RecordingError when the file cannot
     be made or the recording ends by itself: a DiskFullError leaves a whole file.
     """
     subscriber = bus.subscriber()
     recorded: dict[bytes, bool] = {}
+    asked = {SYSTEM}
+
+    def ask(user: str) -> None:
+        # The subscription is what makes a sensor's node send them, so each user's has to be named.
+        if raw and user not in asked:
+            asked.add(user)
+            subscriber.subscribe(f"{user}/{RAW_PREFIX}")
 
     def take(batch: list[Received]) -> None:
         for message, arrival, (topic, payload) in batch:
             wanted = recorded.get(topic)
             if wanted is None:
-                wanted = recorded[topic] = split_topic(message.topic)[1].recorded
+                ask(message.user)
+                entry = split_topic(message.topic)[1]
+                wanted = recorded[topic] = entry.recorded or (raw and entry.role is Role.RAW)
             if wanted:
                 writer.write(topic, payload, arrival, message.t_pub, message.seq)
 
     try:
+        ask(settings.user)
         await subscriber.ready()
         writer = RecordingWriter(path, to_toml(settings), bus.clock)
         try:
@@ -73,7 +89,7 @@ class Recorder:
 
     @property
     def handlers(self) -> dict[str, Callable[..., Any]]:
-        """For the control socket: ``record/start {name}`` and ``record/stop``."""
+        """For the control socket: ``record/start {name, raw}`` and ``record/stop``."""
         return {"record/start": self.start, "record/stop": self.stop}
 
     @property
@@ -81,7 +97,7 @@ class Recorder:
         """Whether one runs, or has ended by itself and was not asked for yet."""
         return self._task is not None
 
-    async def start(self, name: RecordingName) -> dict[str, Any]:
+    async def start(self, name: RecordingName, raw: bool = False) -> dict[str, Any]:
         """Begin ``<name>.mcap``. Raises ControlError: one runs already, or the file cannot be made."""
         if self._task is not None and not self._task.done():
             raise ControlError(Code.BUSY, "a recording is running already")
@@ -93,7 +109,7 @@ class Recorder:
         self._writer = None
         self._began = self._bus.clock()
         self._task = asyncio.create_task(
-            run(self._bus, self._settings, path, on_started=started.set_result), name="recorder"
+            run(self._bus, self._settings, path, raw=raw, on_started=started.set_result), name="recorder"
         )
         waiting: set[asyncio.Future[Any]] = {self._task, started}
         await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
