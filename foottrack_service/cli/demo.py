@@ -142,9 +142,12 @@ def _plugged_in(
 ) -> tuple[Scenario, Hardware]:
     from foottrack_service.cli.sim import scenario_for
     from foottrack_service.demo.hardware import PICTURES, Hardware
+    from foottrack_service.fusion.foot_filter import warm_up
 
     if camera not in PICTURES:
         raise CommandFailed(f"--camera is {', '.join(PICTURES)}, not {camera!r}", EXIT_USAGE)
+    # Now, since the scenario's time runs once the service starts.
+    warm_up()
     finds = {"camera": camera == "simulated"}
     scenario = scenario_for(task, seed, settings, seconds=seconds, imu_hz=imu_hz, **finds)
     return scenario, Hardware(scenario, settings, imu_hz, camera)

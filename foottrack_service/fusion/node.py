@@ -12,6 +12,7 @@ from foottrack_service.bus.publisher import Publisher
 from foottrack_service.bus.subscriber import Received
 from foottrack_service.config import Settings
 from foottrack_service.fusion.core import SOURCE, FusionCore
+from foottrack_service.fusion.foot_filter import warm_up
 
 _HEALTH_PERIOD_NS = 500_000_000
 _IDLE_NS = 20_000_000
@@ -20,6 +21,9 @@ _INPUTS = (Role.MEASUREMENT, Role.CALIBRATION)
 
 async def run(bus: Bus, settings: Settings) -> None:
     """Fuse what arrives for the settings' user until cancelled."""
+    if settings.fusion.filter == "error-state":
+        # Beside the loop: what is held up here, serial bytes for one, would be stamped late.
+        await asyncio.to_thread(warm_up)
     publisher = bus.publisher(SOURCE)
     subscriber = bus.subscriber(
         [f"{settings.user}/{topic.stream}" for topic in TOPICS.values() if topic.role in _INPUTS]

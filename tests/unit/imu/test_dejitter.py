@@ -136,6 +136,22 @@ def test_a_stall_with_kept_data_does_not_move_the_clock() -> None:
     assert dejitter.resets == 0
 
 
+@pytest.mark.parametrize("clock", [MICROS, RVC])
+@pytest.mark.parametrize("stall_ms", [40, 100, 300, 1000])
+def test_a_stall_at_the_start_is_forgotten_as_soon_as_it_ends(clock: DeviceClock, stall_ms: int) -> None:
+    """A service that is still starting reads what came meanwhile in one go."""
+    dejitter = Dejitter(clock)
+    rng = np.random.default_rng(2)
+    for k in range(1000):
+        true_ns = k * 10_000_000
+        arrival = max(true_ns + int(rng.exponential(800_000)), stall_ms * 1_000_000)
+        ticks = k if clock is RVC else k * 10_000
+        stamp = dejitter.stamp(ticks % clock.modulus, START + arrival)
+        if true_ns > (stall_ms + 100) * 1_000_000:
+            assert abs(stamp.t - START - true_ns) < 3_000_000
+    assert stamp.t_dev_us == 9_990_000
+
+
 def test_a_lasting_change_of_delay_is_a_new_clock_after_a_second() -> None:
     dejitter = Dejitter(MICROS)
     for k in range(3000):
