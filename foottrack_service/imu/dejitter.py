@@ -21,6 +21,12 @@ HALF_TIME_S = 90.0
 EARLY_S = 0.05
 """A sample cannot arrive before it was measured: so far ahead of the line, the device has a new clock."""
 
+YOUNG_S = 2.0
+"""A line so young hangs on its first samples. When those were held up, as by a service that was still starting ..."""
+
+YOUNG_EARLY_S = 5e-3
+"""... the next are early by so much, and the line begins at them: bent by all of them, it would err for minutes."""
+
 LATE_S = 0.25
 """Later ones were held up and say nothing about the clock ..."""
 
@@ -100,18 +106,23 @@ class _Fit:
     """The line: at the counter's value ``total`` the arrival was expected ``_offset_s`` after ``_t0``."""
 
     def __init__(self, clock: DeviceClock, ticks: int, t: int, forget_per_s: float) -> None:
-        self.total = ticks
-        self.skew = 0.0
         self._clock = clock
         self._tick_s = clock.tick_us * 1e-6
         self._forget_per_s = forget_per_s
+        self._first = ticks
+        self._begin(ticks, t)
+
+    def _begin(self, total: int, t: int) -> None:
+        """A line through this sample alone."""
+        self.total = total
+        self.skew = 0.0
         self._t0 = t
         self._offset_s = 0.0
         self._floor_s = 0.0
         self._residual_s = CLIP_START_S
         self._p00 = 1.0
         self._p01 = 0.0
-        self._p11 = self._p11_start = clock.tolerance**2 * _START_VARIANCE
+        self._p11 = self._p11_start = self._clock.tolerance**2 * _START_VARIANCE
         self._late_since: float | None = None
 
     def is_another_clock(self, ticks: int, t: int) -> bool:
@@ -121,18 +132,22 @@ class _Fit:
         if back and modulus * self._tick_s > _BACKWARDS_FROM_S:
             return True
         arrival = (t - self._t0) * 1e-9
-        behind = arrival - self._expected(self._unwrapped(ticks, arrival))
+        total = self._unwrapped(ticks, arrival)
+        behind = arrival - self._expected(total)
         if behind <= LATE_S:
             self._late_since = None
         elif self._late_since is None:
             self._late_since = arrival
         too_long = self._late_since is not None and arrival - self._late_since > LATE_FOR_S
-        return behind < -EARLY_S or too_long
+        return (behind < -EARLY_S and not self._is_young(total)) or too_long
 
     def update(self, ticks: int, t: int) -> int:
         """The line with this sample; returns the sample's instant, ns."""
         arrival = (t - self._t0) * 1e-9
         total = self._unwrapped(ticks, arrival)
+        if self._is_young(total) and arrival - self._expected(total) < self._floor_s - YOUNG_EARLY_S:
+            self._begin(total, t)
+            return t
         dt = (total - self.total) * self._tick_s
         self._advance(total, dt)
         behind = arrival - self._offset_s
@@ -151,6 +166,9 @@ class _Fit:
             rise = (FLOOR_RISE + _NOISE_S * math.sqrt(self._p11)) * max(dt, 0.0)
             self._floor_s = min(self._floor_s - k0 * pull + rise, arrival - self._offset_s)
         return self._t0 + round((self._offset_s + min(self._floor_s, arrival - self._offset_s)) * 1e9)
+
+    def _is_young(self, total: int) -> bool:
+        return (total - self._first) * self._tick_s < YOUNG_S
 
     def _advance(self, total: int, dt: float) -> None:
         self.total = total
