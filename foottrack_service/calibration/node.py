@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -55,25 +55,21 @@ class CalibrationDesk:
             "calibrate/mount": self.mount,
         }
 
-    async def floor(self, user: str | None = None) -> FloorCalibration:
+    def floor(self, user: str | None = None) -> Awaitable[FloorCalibration]:
         """The floor's height. Raises ControlError, as all of them."""
-        found: FloorCalibration = await self._run(user, lambda: FloorFlow(self._settings, self._mount))
-        return found
+        return self._run(user, lambda: FloorFlow(self._settings, self._mount))
 
-    async def heading(self, user: str | None = None) -> HeadingCalibration:
+    def heading(self, user: str | None = None) -> Awaitable[HeadingCalibration]:
         """Forward, and the IMUs' yaw."""
-        found: HeadingCalibration = await self._run(user, lambda: HeadingFlow(self._settings))
-        return found
+        return self._run(user, lambda: HeadingFlow(self._settings))
 
-    async def body(self, user: str | None = None, height: Height | None = None) -> BodyCalibration:
+    def body(self, user: str | None = None, height: Height | None = None) -> Awaitable[BodyCalibration]:
         """The person's measures; ``height`` m, standing, if it is known."""
-        found: BodyCalibration = await self._run(user, lambda: BodyFlow(self._settings, height, self._floor))
-        return found
+        return self._run(user, lambda: BodyFlow(self._settings, height, self._floor))
 
-    async def mount(self, user: str | None = None) -> MountCalibration:
+    def mount(self, user: str | None = None) -> Awaitable[MountCalibration]:
         """The camera's mount on the headset."""
-        found: MountCalibration = await self._run(user, lambda: MountFlow(self._settings))
-        return found
+        return self._run(user, lambda: MountFlow(self._settings))
 
     async def run(self) -> None:
         """Publish what is known, every 5 s, until cancelled."""
