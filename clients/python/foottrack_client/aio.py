@@ -19,6 +19,7 @@ from foottrack_client.errors import NoAnswer, NotReady, RequestFailed
 from foottrack_client.publisher import Publisher
 from foottrack_client.receiver import Receiver, Statistics, newest
 from foottrack_client.requests import request_of, result_of
+from foottrack_client.revival import PATIENCE_S, Revival
 from foottrack_protocol import Message
 from foottrack_protocol.messages import Session
 from foottrack_protocol.topics import DEFAULT_USER, WELCOME
@@ -38,6 +39,7 @@ class AsyncSubscription:
         set_up(self._socket, endpoint)
         for prefix in (WELCOME.decode(), *prefixes):
             self._socket.subscribe(prefix)
+        self._revival = Revival(self._socket, endpoint)
         self._socket.connect(endpoint)
 
     @property
@@ -72,6 +74,7 @@ class AsyncSubscription:
 
     def close(self) -> None:
         """Close; what was not read is lost."""
+        self._revival.close()
         self._socket.close(0)
 
     async def __aiter__(self) -> AsyncIterator[Message]:
@@ -87,6 +90,8 @@ class AsyncSubscription:
         self.close()
 
     async def _receive(self) -> None:
+        while not await self._socket.poll(int(PATIENCE_S * 1000)):
+            self._revival.check()
         message = self._receiver.take(await self._socket.recv_multipart())
         if message is not None:
             self._waiting.append(message)

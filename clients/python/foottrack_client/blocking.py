@@ -17,6 +17,7 @@ from foottrack_client.errors import NoAnswer, NotReady, RequestFailed
 from foottrack_client.publisher import Publisher
 from foottrack_client.receiver import Receiver, Statistics, newest
 from foottrack_client.requests import request_of, result_of
+from foottrack_client.revival import PATIENCE_S, Revival
 from foottrack_protocol import Message
 from foottrack_protocol.messages import Session
 from foottrack_protocol.topics import DEFAULT_USER, SYSTEM, WELCOME
@@ -35,6 +36,7 @@ class Subscription:
         set_up(self._socket, endpoint)
         for prefix in (WELCOME.decode(), *prefixes):
             self._socket.subscribe(prefix)
+        self._revival = Revival(self._socket, endpoint)
         self._socket.connect(endpoint)
 
     @property
@@ -68,6 +70,7 @@ class Subscription:
 
     def close(self) -> None:
         """Close; what was not read is lost."""
+        self._revival.close()
         self._socket.close(0)
 
     def __iter__(self) -> Iterator[Message]:
@@ -84,8 +87,14 @@ class Subscription:
 
     def _receive(self, timeout_s: float | None) -> bool:
         """Read one message from the socket, whatever it is. Says whether there was one in time."""
-        if not self._socket.poll(None if timeout_s is None else max(0, int(timeout_s * 1000))):
-            return False
+        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        wait_s = PATIENCE_S if timeout_s is None else max(0.0, min(timeout_s, PATIENCE_S))
+        while not self._socket.poll(int(wait_s * 1000)):
+            self._revival.check()
+            if deadline is not None:
+                wait_s = min(deadline - time.monotonic(), PATIENCE_S)
+                if wait_s <= 0:
+                    return False
         message = self._receiver.take(self._socket.recv_multipart())
         if message is not None:
             self._waiting.append(message)

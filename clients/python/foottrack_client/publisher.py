@@ -12,6 +12,7 @@ import zmq
 from foottrack_client.clock import Clock
 from foottrack_client.endpoints import set_up
 from foottrack_client.errors import NotReady
+from foottrack_client.revival import PATIENCE_S, Revival
 from foottrack_protocol import Message, encode
 
 _SUBSCRIBE_ALL = b"\x01"
@@ -40,6 +41,7 @@ class Publisher:
         # The socket reports a lost bus instead of keeping stale samples for it, and a full queue instead of dropping.
         self._socket.setsockopt(zmq.IMMEDIATE, 1)
         self._socket.setsockopt(zmq.XPUB_NODROP, 1)
+        self._revival = Revival(self._socket, endpoint)
         self._socket.connect(endpoint)
 
     @property
@@ -52,6 +54,8 @@ class Publisher:
                 self._live = True
             elif frame == _UNSUBSCRIBE_ALL:
                 self._live = False
+        if not self._live:
+            self._revival.check()
         return self._live
 
     def wait_ready(self, timeout_s: float = 5.0) -> None:
@@ -59,7 +63,7 @@ class Publisher:
         deadline = self._clock.own() + int(timeout_s * 1e9)
         while not self.live:
             left_ms = (deadline - self._clock.own()) // 1_000_000
-            if left_ms <= 0 or not self._socket.poll(left_ms):
+            if not self._socket.poll(max(0, min(left_ms, int(PATIENCE_S * 1000)))) and left_ms <= 0:
                 raise NotReady(f"no bus answers at {self._endpoint}: is the service running?")
 
     def publish(self, stream: str, data: Any, *, t: int | None = None, valid: bool = True) -> bool:
@@ -94,6 +98,7 @@ class Publisher:
 
     def close(self, linger_s: float = 1.0) -> None:
         """Close; what was sent may take so long to leave."""
+        self._revival.close()
         self._socket.close(int(linger_s * 1000))
 
     def __enter__(self) -> Self:
