@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -111,6 +112,34 @@ def corridor(file: Path) -> tuple[FootTrial, int]:
         name, "right", t, columns["acc"], columns["gyr"], _FORWARD_RIGHT_DOWN_TO_FOOT, t[marks], columns["gcp_xy"]
     )
     return trial, len(marks) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class HeadTrace:
+    """A headset's poses in the stage."""
+
+    name: str
+    t: Array
+    """s, shape (n,)."""
+    p: Array
+    """m, shape (n, 3)."""
+    q: Array
+    """Head to stage, shape (n, 4)."""
+
+
+def quest(file: Path) -> HeadTrace:
+    """A headset that walks in place, 72 Hz. Raises DatasetError."""
+    try:
+        values = json.loads(file.read_text(encoding="utf-8"))
+        p = np.array(values["head_position"], dtype=np.float64).reshape(-1, 3)
+        pitch, yaw, roll = np.array(values["head_orientation"], dtype=np.float64).reshape(-1, 3).T
+        rate = float(values["target_fps"])
+    except (OSError, KeyError, ValueError, TypeError) as error:
+        raise DatasetError(f"{file}: {error}") from None
+    if rate <= 0.0 or len(p) != len(yaw):
+        raise DatasetError(f"{file}: no rate, or positions without orientations")
+    tilt = rot.multiply(rot.from_axis_angle([1.0, 0.0, 0.0], pitch), rot.from_axis_angle([0.0, 0.0, 1.0], roll))
+    return HeadTrace(f"quest {file.stem}", np.arange(len(p)) / rate, p, rot.multiply(rot.from_yaw(yaw), tilt))
 
 
 def levelled(trial: FootTrial, rest_s: float = 0.5) -> FootTrial:

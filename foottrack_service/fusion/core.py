@@ -33,6 +33,7 @@ from foottrack_service.fusion.foot import Foot
 from foottrack_service.fusion.gait_link import GaitLink
 from foottrack_service.fusion.head_history import HeadHistory
 from foottrack_service.fusion.interface import FootEstimate, HeadSample
+from foottrack_service.fusion.mount_watch import MountWatch
 from foottrack_service.rotations import Array
 
 SOURCE = "fusion"
@@ -56,7 +57,9 @@ class FusionCore:
         self._heads = HeadHistory()
         self._origin: int | None = None
         self._calibrated: dict[tuple[str, Side | None], Any] = {}
-        self._feet: dict[Side, Foot] = {side: Foot(settings, side, self._heads) for side in SIDES}
+        watched = settings.fusion.mount_calibration and settings.fusion.filter == "error-state"
+        self._watch = MountWatch(settings.camera.mount_hash) if watched else None
+        self._feet: dict[Side, Foot] = {side: Foot(settings, side, self._heads, self._watch) for side in SIDES}
         self._toes = {side: np.array(settings.feet.of(side).toe.p) for side in SIDES}
         self._shortest_ns = round(1e9 / settings.fusion.max_output_hz)
         self._silence_ns = round(settings.fusion.silence * 1e9)
@@ -93,7 +96,8 @@ class FusionCore:
             self._started = True
         elif message.stream == "head/pose":
             self._on_head(message.t, message.data, now)
-        elif message.stream == "calibration":
+        elif message.stream == "calibration" and (message.src != SOURCE or self._watch is None):
+            # Our own comes back from the bus, and is in recordings: whoever watches finds it again.
             self._on_calibration(message.data)
         if self._last_output is None and self._started:
             return self._publish(now)
@@ -154,6 +158,8 @@ class FusionCore:
         elif isinstance(found, ImuCalibration):
             self._feet[found.values.side].on_imu_calibration(found.values)
         elif isinstance(found, MountCalibration):
+            if self._watch is not None:
+                self._watch.restart()
             for foot in self._feet.values():
                 foot.on_mount(found.values)
 
@@ -179,13 +185,22 @@ class FusionCore:
             right=self._foot_pose("right", feet.get("right"), legs),
         )
         pose = self._message("pose/body", now, now, body)
-        gait = self._gait.update(now, feet.get("left"), feet.get("right"), head)
+        gait = self._gait.update(now, feet, {side: foot.imu_t for side, foot in self._feet.items()}, head)
         return [
             pose,
             self._message("pose/ik", now, now, gait.ik),
             self._message("gait/state", now, now, gait.state),
             *(self._message("gait/event", t, now, event) for t, event in gait.events),
+            *self._mount_found(now),
         ]
+
+    def _mount_found(self, now: int) -> list[Message]:
+        found = None if self._watch is None else self._watch.found(now)
+        if found is None:
+            return []
+        for foot in self._feet.values():
+            foot.on_mount(found.values)
+        return [self._message("calibration", now, now, found)]
 
     def _foot_pose(self, side: Side, found: FootEstimate | None, legs: Legs | None) -> FootPose | None:
         if found is None:

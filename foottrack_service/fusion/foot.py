@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from foottrack_service.config import Placement, Settings
 from foottrack_service.fusion.filters import make_filter
 from foottrack_service.fusion.head_history import HeadHistory
 from foottrack_service.fusion.interface import FootEstimate, HeadSample, ImuSample, Kind, OpticalFix, Verdict
+from foottrack_service.fusion.mount_watch import MountWatch
 from foottrack_service.rotations import Array
 
 MOST_ACCELERATION = 1000.0
@@ -39,14 +40,16 @@ class _Waiting:
 class Foot:
     """Takes a foot's messages, checks that they are plausible, and runs its filter."""
 
-    def __init__(self, settings: Settings, side: Side, heads: HeadHistory) -> None:
-        self._settings, self._side = settings, side
+    def __init__(self, settings: Settings, side: Side, heads: HeadHistory, watch: MountWatch | None = None) -> None:
+        self._settings, self._side, self._watch = settings, side, watch
         self._filter = make_filter(settings, side)
         self._heads = heads
         self._delay_ns = round(settings.timing.imu_delay * 1e9)
         self._acc_bias: Array | None = None
         self._gyro_bias: Array | None = None
         self._mount: Placement | None = None
+        self.imu_t: int | None = None
+        """Stamp of the newest sample that was used, ns."""
         self._waiting: deque[_Waiting] = deque(maxlen=64)
         self._accepted: Counter[str] = Counter()
         self._rejected: Counter[str] = Counter()
@@ -74,6 +77,7 @@ class Foot:
         q = None if body.q is None else np.array(body.q)
         self._filter.on_imu(ImuSample(t - self._delay_ns, acc, gyro, q))
         self._accepted["imu"] += 1
+        self.imu_t = t
 
     def on_optical(self, kind: Kind, t: int, body: Optical, now: int) -> None:
         """A camera's fix made at ``t``, arriving at ``now`` (ns). It may have to wait for the head pose around it."""
@@ -147,16 +151,25 @@ class Foot:
         q_alt = None if body.q_alt is None else np.array(body.q_alt)
         xx, xy, xz, yy, yz, zz = body.cov
         cov = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if self._mount is not None:
-            turn = np.array(self._mount.q)
-            p = rot.rotate(turn, p) + np.array(self._mount.p)
-            q = None if q is None else rot.multiply(turn, q)
-            q_alt = None if q_alt is None else rot.multiply(turn, q_alt)
-            matrix = rot.to_matrix(turn)
-            cov = matrix @ cov @ matrix.T
         fix = OpticalFix(waiting.t, waiting.kind, p, q, q_alt, cov, body.size_ratio, body.edge_px, head, newest)
-        verdict = self._filter.on_fix(fix, now)
-        if verdict is Verdict.ACCEPTED:
-            self._accepted[waiting.kind] += 1
-        else:
+        verdict = self._filter.on_fix(self._mounted(fix), now)
+        if verdict is not Verdict.ACCEPTED:
             self._rejected[verdict] += 1
+            return
+        self._accepted[waiting.kind] += 1
+        if self._watch is not None:
+            self._watch.add(self._side, fix, self._filter.standing)
+
+    def _mounted(self, fix: OpticalFix) -> OpticalFix:
+        """The fix as the corrected mount gives it."""
+        if self._mount is None:
+            return fix
+        turn = np.array(self._mount.q)
+        matrix = rot.to_matrix(turn)
+        return replace(
+            fix,
+            p=rot.rotate(turn, fix.p) + np.array(self._mount.p),
+            q=None if fix.q is None else rot.multiply(turn, fix.q),
+            q_alt=None if fix.q_alt is None else rot.multiply(turn, fix.q_alt),
+            cov=matrix @ fix.cov @ matrix.T,
+        )

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from foottrack_protocol.frames import SIDES
+from foottrack_protocol.messages import Side
 from foottrack_service.body.skeleton import Skeleton
 from foottrack_service.config import FootSettings, Settings
-from foottrack_service.fusion.interface import FootEstimate, HeadSample
+from foottrack_service.fusion.interface import COASTING_S, FootEstimate, HeadSample
 from foottrack_service.gait import samples
 from foottrack_service.gait.gait import Gait
 
@@ -24,10 +28,11 @@ class GaitLink:
             self._wearer, self._gait = found, Gait(found, self._settings.gait)
 
     def update(
-        self, now: int, left: FootEstimate | None, right: FootEstimate | None, head: HeadSample | None
+        self, now: int, feet: Mapping[Side, FootEstimate], imu_t: Mapping[Side, int | None], head: HeadSample | None
     ) -> samples.GaitOutputs:
-        """The gait at ``now`` ns."""
-        return self._gait.update(now, foot_sample(left), foot_sample(right), head_sample(head))
+        """The gait at ``now`` ns; ``imu_t``: when each foot's IMU was last heard, ns."""
+        left, right = (foot_sample(feet.get(side), now, imu_t[side]) for side in SIDES)
+        return self._gait.update(now, left, right, head_sample(head))
 
 
 def wearer(settings: Settings, skeleton: Skeleton) -> samples.Wearer:
@@ -41,9 +46,14 @@ def wearer(settings: Settings, skeleton: Skeleton) -> samples.Wearer:
     )
 
 
-def foot_sample(found: FootEstimate | None) -> samples.FootSample | None:
-    """None for a foot that is unknown or lost."""
-    if found is None or found.stage == "lost":
+def foot_sample(found: FootEstimate | None, now: int, imu_t: int | None) -> samples.FootSample | None:
+    """None for a foot that nobody measures any more.
+
+    A foot that is lost only because its place in the room has become too uncertain still has a gait.
+    """
+    if found is None:
+        return None
+    if found.stage == "lost" and (imu_t is None or (now - imu_t) * 1e-9 > COASTING_S):
         return None
     x, y, z = found.p.tolist()
     qx, qy, qz, qw = found.q.tolist()

@@ -28,6 +28,10 @@ _STRIDE = 0.12
 """m: toes that have gone so far over the floor make a step, however low."""
 _ONSET_SPEED = 0.05
 """m/s, upwards: slower is no lift."""
+_SMOOTH, _LOW_POINT = 1.6, 2.1
+"""How movements begin: the heel's rise between a line and a parabola, the toes', which roll off, smoother."""
+_LIFT_SPEED = 0.12
+"""m/s, upwards, of the lowest point: a sole that rolls over its toes seems to rise more slowly."""
 _LONGEST_ONSET_S = 0.12
 _LEAST_STEP, _MOST_STEP = 0.018, 0.04
 """m: a foot that has risen by so much steps; in between by the person's own peaks."""
@@ -193,8 +197,8 @@ class FootPhases:
         elif self._heel < 0.4 * _HEEL_RISE:
             self._heel_off_ns = None
         if self._off_ns is None:
-            if self.lift > _TOE_RISE and self._low_speed > _ONSET_SPEED:
-                self._off_ns = _onset(t, dt, lift_before, self.lift, _TOE_RISE, self._low_speed)
+            if self.lift > _TOE_RISE and self._low_speed > _LIFT_SPEED:
+                self._off_ns = _onset(t, dt, lift_before, self.lift, _TOE_RISE, self._low_speed, _LOW_POINT)
         elif self.lift < 0.6 * _TOE_RISE and not self._slides:
             self._off_ns = None
         self._slip(t, dt, slid)
@@ -283,8 +287,8 @@ class FootPhases:
         self._slide = (0.0, 0.0)
 
 
-def _onset(t: int, dt: float, before: float, now: float, threshold: float, speed: float) -> int:
-    """When a rise began that crossed a threshold (m) with this speed: smooth rises begin like a parabola."""
+def _onset(t: int, dt: float, before: float, now: float, threshold: float, speed: float, power: float = _SMOOTH) -> int:
+    """When a rise began that crossed a threshold (m) with this speed, m/s: it began like time to the ``power``."""
     crossed = dt * (now - threshold) / max(now - before, 1e-9)
-    begun = min(1.6 * threshold / speed, _LONGEST_ONSET_S)
+    begun = min(power * threshold / speed, _LONGEST_ONSET_S)
     return t - round(1e9 * (crossed + begun))

@@ -32,7 +32,8 @@ class Gait:
         self._wearer, self._settings = wearer, settings
         self._feet = Feet(FootPhases(wearer.left), FootPhases(wearer.right))
         self._steps = Steps(self._feet, make_model(settings.speed, wearer.height), settings.most_speed)
-        self._legs = _make_legs(settings, wearer)
+        self.legs = _make_legs(settings, wearer)
+        """What moves the avatar's legs."""
         self._heading = Heading()
         self._bob = HeadBob(wearer.height)
         self._alone_since: int | None = None
@@ -57,7 +58,7 @@ class Gait:
             else:
                 phases.update(t, foot)
         happened = self._steps.update(t, samples)
-        legs = self._legs.update(t, dt, self._feet, self._steps)
+        legs = self.legs.update(t, dt, self._feet, self._steps)
         state = GaitState(
             left=_foot_gait(self._feet.left) if known_left else None,
             right=_foot_gait(self._feet.right) if known_right else None,

@@ -193,10 +193,10 @@ class WalkingLegs:
             self._returning, self._returned_s = farther, 0.0
             self._legs[farther].origin = self._legs[farther].z
         leg = self._legs[self._returning]
-        before = _eased(self._returned_s / _RETURN_S)
+        before = _carried(self._returned_s / _RETURN_S)
         self._returned_s += dt
         share = min(self._returned_s / _RETURN_S, 1.0)
-        now = _eased(share)
+        now = _carried(share)
         leg.z = leg.z * (1.0 - now) / (1.0 - before) if before < 1.0 else 0.0
         lift = min(max(_RETURN_LIFT * abs(leg.origin), _LEAST_LIFT), _LARGEST_LIFT)
         leg.extra = lift * math.sin(math.pi * share) ** 2
@@ -204,6 +204,7 @@ class WalkingLegs:
             self._returning = None
 
 
-def _eased(share: float) -> float:
-    s = min(max(share, 0.0), 1.0)
+def _carried(share: float) -> float:
+    """How much of its way a returning foot has gone: it is lifted first, and set down last."""
+    s = min(max((share - 0.2) / 0.6, 0.0), 1.0)
     return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
