@@ -5,11 +5,12 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 ARGS ?=
 
-.PHONY: help setup demo test lint lock schemas bench clean
+.PHONY: help setup demo test test-clients lint lock schemas bench clean
 
 help:
 	@echo "make demo     two feet tracked on simulated hardware (options: make demo ARGS='--seconds 30 --task line')"
 	@echo "make test     lint, types, import directions and the whole test suite"
+	@echo "make test-clients  installs engines where it can, and runs the clients' tests alone"
 	@echo "make lint     ruff, mypy --strict, import directions"
 	@echo "make bench    latency and throughput beside their floors"
 	@echo "make schemas  regenerate protocol/schema, protocol/vectors and the tables in SPEC.md"
@@ -38,6 +39,11 @@ lint: setup
 
 test: lint
 	$(BIN)/pytest $(ARGS)
+
+# An engine that cannot be installed here is no failure: its tests are skipped, and say so.
+test-clients: setup
+	-tests/clients/install_godot.sh
+	$(BIN)/pytest tests/clients $(ARGS)
 
 bench: setup
 	$(BIN)/foottrack bench $(ARGS)
