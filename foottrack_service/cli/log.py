@@ -12,7 +12,15 @@ import typer
 from rich.console import Console
 from rich.progress import track
 
-from foottrack_service.cli.running import EXIT_FAILED, EXIT_USAGE, CommandFailed, JsonOption, print_json
+from foottrack_service.cli.running import (
+    EXIT_FAILED,
+    EXIT_USAGE,
+    CommandFailed,
+    ConfigOption,
+    JsonOption,
+    UserOption,
+    print_json,
+)
 from foottrack_service.recording.errors import RecordingError
 
 if TYPE_CHECKING:
@@ -30,6 +38,7 @@ FileArgument = Annotated[Path, typer.Argument(help="A recording: MCAP, or a bare
 TopicOption = Annotated[
     list[str] | None, typer.Option("--topic", "-t", help="Only topics that begin so; may be given several times.")
 ]
+OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder to write into; nothing there is overwritten.")]
 FromOption = Annotated[float | None, typer.Option("--from", min=0.0, help="Begin here, s from the first message.")]
 ToOption = Annotated[float | None, typer.Option("--to", min=0.0, help="End here, s from the first message.")]
 
@@ -208,6 +217,27 @@ def recover(
 
         show_recovered(report, out)
     raise typer.Exit(EXIT_NOTHING if not report.messages else 0 if report.whole else EXIT_LOSSES)
+
+
+@app.command()
+def raw(
+    file: FileArgument,
+    out: OutOption,
+    user: UserOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Unpack what record --raw has recorded: bytes of the IMUs, and pictures that the folder source plays.
+
+    Writes imu-left.bin (imu-left.csv has each read's time, length and format), camera/ in TUM's layout, and a
+    foottrack.toml to play it with. The bytes are decoded again, and counted.
+
+    Example: foottrack log raw trouble.mcap --out trouble
+    """
+    from foottrack_service.cli.log_raw import unpack
+
+    with _readable_errors():
+        unpack(_open(file), out, user, config, as_json)
 
 
 def _open(file: Path) -> Recording:
