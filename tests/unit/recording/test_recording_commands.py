@@ -11,7 +11,9 @@ from recording_samples import CONFIG, frames, frames_of, write
 from typer.testing import CliRunner
 
 from foottrack_service.cli.log import app
+from foottrack_service.cli.log_text import show_info
 from foottrack_service.cli.running import CommandFailed
+from foottrack_service.recording.info import RecordingInfo, TopicInfo
 from foottrack_service.recording.reader import open_recording
 
 
@@ -45,6 +47,21 @@ def test_info(recording: Path) -> None:
     assert values["messages"] == 400
     assert values["topics"]["user/imu/left"]["hz"] == pytest.approx(250.0)
     assert values["has_config"] is True
+
+
+@pytest.mark.parametrize("width", [40, 80, 200])
+def test_info_cuts_no_name_and_no_number_however_narrow_the_terminal(
+    width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    name = "somebody-with-a-rather-long-name/raw/imu/right"
+    topic = TopicInfo(1234567, lost=120345, invalid=7, last=10**12, longest_gap_s=12.3, sources=["imu-right"])
+    show_info(RecordingInfo("a.mcap", "mcap", 10**6, messages=1234567, topics={name: topic}))
+    shown = capsys.readouterr().out
+    assert f"{name} " in shown
+    assert "1234567" in shown
+    assert ("120345" in shown) == (width >= 80)
+    assert ("imu-right" in shown) == (width >= 200)
 
 
 def test_cat_picks_topics_and_times(recording: Path) -> None:
