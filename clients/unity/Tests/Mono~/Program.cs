@@ -10,6 +10,9 @@ namespace Foottrack.Tests
             switch (arguments[0])
             {
                 case "vectors": return Vectors.Run(arguments[1]);
+                case "tests": return EditorTests.Run();
+                case "allocations": return Allocations.Run(arguments[1], int.Parse(arguments[2]));
+                case "game": return Game.Run(arguments);
                 default:
                     Console.Error.WriteLine("unknown: " + arguments[0]);
                     return 2;

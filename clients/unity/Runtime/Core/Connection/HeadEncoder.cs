@@ -5,7 +5,6 @@ namespace Foottrack
     /// <summary>`head/pose` as the two frames of a message, headers included, without allocating.</summary>
     internal sealed class HeadEncoder
     {
-        private const double UnitTolerance = 1e-3;
         private const int MaxNameBytes = 100;
         /// <summary>Keys, numbers and headers: about 230.</summary>
         private const int MaxOtherBytes = 400;
@@ -117,7 +116,7 @@ namespace Foottrack
 
         private static bool IsUnit(Quat q)
         {
-            return Math.Abs(Math.Sqrt(q.X * q.X + q.Y * q.Y + q.Z * q.Z + q.W * q.W) - 1.0) <= UnitTolerance;
+            return Math.Abs(Math.Sqrt(q.X * q.X + q.Y * q.Y + q.Z * q.Z + q.W * q.W) - 1.0) <= GeometryReader.UnitTolerance;
         }
     }
 }

@@ -8,9 +8,6 @@ namespace Foottrack
     /// </summary>
     internal sealed class MsgpackReader
     {
-        /// <summary>Of a quaternion's or a direction's length.</summary>
-        private const double UnitTolerance = 1e-3;
-
         private readonly MsgpackScanner _scanner = new MsgpackScanner();
         private byte[] _bytes;
         private int _at;
@@ -195,28 +192,6 @@ namespace Foottrack
             return value;
         }
 
-        public Vec3 ReadVec3()
-        {
-            Require(EnterArray() == 3);
-            return new Vec3(ReadFloat(), ReadFloat(), ReadFloat());
-        }
-
-        public Vec3 ReadDirection()
-        {
-            Vec3 v = ReadVec3();
-            double scale = UnitScale(Math.Sqrt(v.X * v.X + v.Y * v.Y + v.Z * v.Z));
-            return new Vec3(v.X * scale, v.Y * scale, v.Z * scale);
-        }
-
-        /// <summary>Normalised.</summary>
-        public Quat ReadQuat()
-        {
-            Require(EnterArray() == 4);
-            var q = new Quat(ReadFloat(), ReadFloat(), ReadFloat(), ReadFloat());
-            double scale = UnitScale(Math.Sqrt(q.X * q.X + q.Y * q.Y + q.Z * q.Z + q.W * q.W));
-            return new Quat(q.X * scale, q.Y * scale, q.Z * scale, q.W * scale);
-        }
-
         /// <summary>Index of the string that is here among `names`.</summary>
         public int ReadName(byte[][] names)
         {
@@ -262,12 +237,6 @@ namespace Foottrack
             Array.Copy(_bytes, from, copy, 0, length);
             _at = from + length;
             return copy;
-        }
-
-        private double UnitScale(double length)
-        {
-            Require(Math.Abs(length - 1.0) <= UnitTolerance);
-            return Fault == Refusal.None ? 1.0 / length : 0.0;
         }
 
         private int Enter(int fix, int wide)

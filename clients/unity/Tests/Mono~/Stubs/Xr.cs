@@ -7,10 +7,10 @@ namespace UnityEngine
     {
         public static readonly List<XR.XRInputSubsystem> Running = new List<XR.XRInputSubsystem>();
 
-        public static void GetSubsystems<T>(List<T> found) where T : XR.XRInputSubsystem
+        public static void GetSubsystems<T>(List<T> found)
         {
             found.Clear();
-            foreach (XR.XRInputSubsystem subsystem in Running)
+            foreach (object subsystem in Running)
             {
                 found.Add((T)subsystem);
             }
