@@ -26,8 +26,19 @@ def evaluate(
     tasks: Annotated[str | None, typer.Option("--tasks", help="Some tasks only, with commas between.")] = None,
     seeds: Annotated[str, typer.Option("--seeds", help="Seeds of the simulations, with commas between.")] = "1,2",
     sections: Annotated[
-        str, typer.Option("--sections", help="Of tasks, technical, study, variants, gaps; or all.")
-    ] = ",".join(DEFAULT_SECTIONS),
+        str | None,
+        typer.Option(
+            "--sections",
+            help=f"Of tasks, technical, study, variants, gaps; or all. {','.join(DEFAULT_SECTIONS)} if absent, and "
+            "tasks alone with --camera rendered.",
+        ),
+    ] = None,
+    camera: Annotated[
+        str,
+        typer.Option(
+            "--camera", help="simulated (finds made up), or rendered: found in drawn pictures, half real time a core."
+        ),
+    ] = "simulated",
     real: Annotated[
         Path | None, typer.Option("--real", help="Instead: real recordings of foot-worn IMUs in this folder.")
     ] = None,
@@ -37,8 +48,12 @@ def evaluate(
 ) -> None:
     """Errors, lag, jitter and skate of our filter and of the published one, with the published figures.
 
-    Examples: foottrack evaluate --tasks walk,still --seeds 7,8,9; foottrack evaluate session.mcap --plot out
+    Examples: foottrack evaluate --tasks walk,still --seeds 7,8,9; foottrack evaluate session.mcap --plot out;
+    foottrack evaluate --camera rendered --seeds 1
     """
+    if camera not in ("simulated", "rendered"):
+        raise CommandFailed(f"--camera is simulated or rendered, not {camera!r}", EXIT_USAGE)
+    sections = sections or ("tasks" if camera == "rendered" else ",".join(DEFAULT_SECTIONS))
     if real is not None:
         from foottrack_service.evaluation.real import real_tables
 
@@ -48,7 +63,8 @@ def evaluate(
 
         results = {"tasks": {file.stem: recorded_tables(file)}}
     else:
-        results = _simulated(_chosen_tasks(tasks), _chosen_seeds(seeds), _chosen_sections(sections), as_json)
+        chosen = _chosen_sections(sections)
+        results = _simulated(_chosen_tasks(tasks), _chosen_seeds(seeds), chosen, camera, as_json)
     if plot is not None or html is not None:
         _draw(results, file, _chosen_tasks(tasks), _chosen_seeds(seeds)[0], plot, html)
     if as_json:
@@ -94,15 +110,15 @@ def _draw(
         typer.echo(f"Wrote {html}.", err=True)
 
 
-def _simulated(tasks: list[str], seeds: list[int], sections: list[Any], quiet: bool) -> dict[str, Any]:
+def _simulated(tasks: list[str], seeds: list[int], sections: list[Any], camera: Any, quiet: bool) -> dict[str, Any]:
     from foottrack_service.evaluation.sections import jobs_of, run_jobs, tables
 
-    jobs = [job for section in sections for job in jobs_of(section, tasks, seeds)]
+    jobs = [job for section in sections for job in jobs_of(section, tasks, seeds, camera)]
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet) as progress:
         bar = progress.add_task("simulating and fusing", total=len(set(jobs)))
         results = run_jobs(jobs, lambda done: progress.update(bar, advance=1, description=done.job.task))
-    found: dict[str, Any] = {section: tables(section, results, tasks, seeds) for section in sections}
+    found: dict[str, Any] = {section: tables(section, results, tasks, seeds, camera) for section in sections}
     found.setdefault("tasks", {})
     return found
 

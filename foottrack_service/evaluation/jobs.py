@@ -49,6 +49,8 @@ class Job:
     """From CUT_S on, the only optical source that is left ("inertial": none)."""
     gaps_s: float | None = None
     """The camera is dark for so long, again and again, with 3 s of light in between."""
+    camera: Literal["simulated", "rendered"] = "simulated"
+    """Whether optical measurements are made up, or found in drawn pictures."""
 
 
 @dataclass(slots=True)
@@ -110,8 +112,13 @@ def run_job(job: Job) -> JobResult:
     """Simulate and fuse. Deterministic."""
     settings = Settings(fusion={"filter": FILTERS[job.filter]})
     scenario = scenario_of(job, settings)
+    arrivals: Iterable[tuple[int, Message]] = scenario.messages()
+    if job.camera == "rendered":
+        from foottrack_service.evaluation.rendered import with_pictures
+
+        arrivals = list(_outside(with_pictures(scenario, job.feet), gap_windows(job)))
     began = time.perf_counter()
-    runs, core = run_filter(_left_on(scenario.messages(), job.only), settings)
+    runs, core = run_filter(_left_on(arrivals, job.only), settings)
     took = time.perf_counter() - began
     result = JobResult(job, {}, times_real_time=scenario.seconds / took)
     for health in core.health.values():
@@ -206,6 +213,16 @@ def _peak_delay(seconds: Array, errors: Array, truth: ScenarioTruth) -> float | 
         if found is not None:
             delays.append(found)
     return float(np.mean(delays)) if delays else None
+
+
+def _outside(
+    arrivals: Iterable[tuple[int, Message]], windows: Sequence[tuple[float, float]]
+) -> Iterator[tuple[int, Message]]:
+    """Without what was seen while the camera was dark: the simulation leaves that out by itself."""
+    for arrival, message in arrivals:
+        optical = message.stream.startswith(("marker/", "depth/"))
+        if not (optical and any(begin <= message.t * 1e-9 < end for begin, end in windows)):
+            yield arrival, message
 
 
 def _left_on(arrivals: Iterable[tuple[int, Message]], only: Source | None) -> Iterator[tuple[int, Message]]:

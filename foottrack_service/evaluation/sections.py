@@ -41,11 +41,12 @@ GAPS_S = (0.5, 1.0, 2.0, 5.0)
 _TECHNICAL_SECONDS = {"still": 60.0}
 
 Results = dict[Job, JobResult]
+Camera = Literal["simulated", "rendered"]
 
 
-def jobs_of(section: Section, tasks: Sequence[str], seeds: Sequence[int]) -> list[Job]:
+def jobs_of(section: Section, tasks: Sequence[str], seeds: Sequence[int], camera: Camera = "simulated") -> list[Job]:
     """The runs that a section needs, for tasks and seeds that were asked for."""
-    filtered = [Job(task, seed, name) for task in tasks for seed in seeds for name in FILTERS]
+    filtered = [Job(task, seed, name, camera=camera) for task in tasks for seed in seeds for name in FILTERS]
     if section == "tasks":
         return filtered
     if section == "technical":
@@ -63,20 +64,25 @@ def jobs_of(section: Section, tasks: Sequence[str], seeds: Sequence[int]) -> lis
 
 
 def run_jobs(jobs: Iterable[Job], on_done: Callable[[JobResult], None]) -> Results:
-    """Run on all cores, each in a spawned process. ``on_done`` hears of each as it ends."""
+    """Run on all cores, in spawned processes. ``on_done`` hears of each as it ends."""
     results: Results = {}
-    wanted = list(dict.fromkeys(jobs))
-    with ProcessPoolExecutor(min(len(wanted) or 1, os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
-        for future in as_completed([pool.submit(run_job, job) for job in wanted]):
-            result = future.result()
-            results[result.job] = result
-            on_done(result)
+    # Jobs of the same pictures go to the same process: they are drawn once.
+    groups: dict[Job, list[Job]] = {}
+    for job in dict.fromkeys(jobs):
+        groups.setdefault(replace(job, filter="ours") if job.camera == "rendered" else job, []).append(job)
+    with ProcessPoolExecutor(min(len(groups) or 1, os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(_run_all, group) for group in groups.values()]):
+            for result in future.result():
+                results[result.job] = result
+                on_done(result)
     return results
 
 
-def tables(section: Section, results: Results, tasks: Sequence[str], seeds: Sequence[int]) -> dict[str, Any]:
+def tables(
+    section: Section, results: Results, tasks: Sequence[str], seeds: Sequence[int], camera: Camera = "simulated"
+) -> dict[str, Any]:
     """A section's figures, as ``--json`` prints them."""
-    wanted = jobs_of(section, tasks, seeds)
+    wanted = jobs_of(section, tasks, seeds, camera)
     found = [results[job] for job in wanted]
     if section == "tasks":
         return {task: _row(task, [r for r in found if r.job.task == task]) for task in tasks}
@@ -113,6 +119,10 @@ def figures(results: Sequence[JobResult], sides: Sequence[Side] = SIDES) -> dict
         "within_sigma": within_sigma(_joined(foot.in_sigma for foot in feet), np.ones(1)),
         "rejected": _added(result.rejected for result in results),
     }
+
+
+def _run_all(jobs: Sequence[Job]) -> list[JobResult]:
+    return [run_job(job) for job in jobs]
 
 
 def _row(task: str, found: Sequence[JobResult]) -> dict[str, Any]:
