@@ -93,6 +93,35 @@ def test_a_foot_out_of_reach_stretches_the_leg_and_not_the_bones(godot: GodotPro
     assert at(said, "LeftFoot")[2] < -0.5
 
 
+@pytest.mark.parametrize(("age", "ahead"), [(0.05, 0.05), (0.3, 0.1)], ids=["to the frame", "no further than 0.1 s"])
+def test_a_moving_foot_is_carried_to_the_frame(godot: GodotProject, age: float, ahead: float) -> None:
+    hips = Pose(p=(0.0, 0.8, 0.0), q=UPRIGHT)
+    ankle = Pose(p=(-0.1, 0.15, 0.0), q=UPRIGHT)
+    left = leg(hips, -0.1, ankle, v=(0.2, 0.0, -2.0), contact=False)
+    body = BodyPose(hips=hips, left=left, right=leg(hips, 0.1, Pose(p=(0.1, USER_ANKLE_M, 0.0), q=UPRIGHT)))
+    said = pose_avatar(godot, "pose/body", body, age=age)
+    lift = AVATAR_ANKLE_M * said["scale"] - USER_ANKLE_M
+    due = [-0.1 + 0.2 * ahead, 0.15 + lift, -2.0 * ahead]
+    assert at(said, "LeftFoot") == pytest.approx(due, abs=TOLERANCE_M)
+
+
+def test_a_pose_of_long_ago_is_none(godot: GodotProject) -> None:
+    said = pose_avatar(godot, "pose/body", lifted_step(), age=0.6)
+    assert at(said, "LeftFoot")[1] == pytest.approx(AVATAR_ANKLE_M, abs=1e-3)
+
+
+def test_the_headset_s_eyes_are_put_into_the_avatar_s_and_the_feet_stay(godot: GodotProject) -> None:
+    # More frames do not carry the avatar away after its own eyes.
+    near, far = (pose_avatar(godot, "pose/body", lifted_step(), eyes="origin", updates=count) for count in (60, 90))
+    body = lifted_step()
+    assert body.right is not None
+    for said in (near, far):
+        lift = np.array([0.0, AVATAR_ANKLE_M * said["scale"] - USER_ANKLE_M, 0.0])
+        assert at(said, "RightFoot") == pytest.approx(np.array(body.right.ankle.p) + lift, abs=TOLERANCE_M)
+        assert 1.3 < said["eyes"]["camera"][1] < 1.9
+    assert near["eyes"]["camera"] == pytest.approx(far["eyes"]["camera"], abs=TOLERANCE_M)
+
+
 @pytest.mark.parametrize("unknown", ["nil", "lost", "not valid"])
 def test_what_is_not_known_hangs_at_rest(godot: GodotProject, unknown: str) -> None:
     lifted = foot(-0.1, ankle_y=0.4)
@@ -118,7 +147,7 @@ def test_the_walker_walks_along_his_heading_with_planted_feet_on_the_floor(godot
         speed=1.2,
         heading=heading,
     )
-    said = pose_avatar(godot, "pose/ik", targets, follow=WALK_IN_PLACE, eyes=True)
+    said = pose_avatar(godot, "pose/ik", targets, follow=WALK_IN_PLACE, eyes="camera")
     place = np.array(said["place"])
     assert place[0] < -0.05 and place[1:] == pytest.approx([0.0, 0.0], abs=1e-5)
     # Turned to -X: the avatar's right is -Z, its forward -X.

@@ -55,8 +55,10 @@ def test_garbage_is_counted_and_the_next_good_message_is_taken(godot: GodotProje
         run.until("connected")
         for item in fuzzed:
             peer.send(message(*item))
-        peer.send(message(b"one frame"))
-        peer.send(message(*[b"many"] * 2000))
+        peer.send(message(b"user/gait/event"))
+        peer.send(message(*[b"user/gait/event"] * 2000))
+        for number in range(3000):
+            peer.send(message(*frames("gait/event", step(1), user=f"made-up-{number}")))
         peer.send(message(b"user/pose/body", bytes(1_000_000)))
         peer.send(frame(b"\x07NOTHING" + bytes(50), COMMAND))
         peer.send(message(*frames("gait/event", step(2))) + message(*frames("gait/event", FINAL)))
@@ -69,6 +71,8 @@ def test_garbage_is_counted_and_the_next_good_message_is_taken(godot: GodotProje
     assert counted["messages"] == len(fuzzed) - sum(due.values()) + 2
     assert topics["user/pose/body"]["drops"] == {"oversized": 1}
     assert said["statistics"]["drops"] == {"frames": 2}
+    # What was not subscribed to takes no memory.
+    assert set(topics) == {"user/gait/event", "user/pose/body"}
 
 
 def test_another_major_is_told_in_words(godot: GodotProject, fake: FakeService) -> None:

@@ -8,7 +8,7 @@ from godot_project import GodotProject
 from live_service import LiveService
 
 from foottrack_client import Client
-from foottrack_protocol.messages import HeadPose
+from foottrack_protocol.messages import GaitEvent, HeadPose
 
 pytestmark = pytest.mark.engine
 
@@ -29,6 +29,30 @@ def test_events_are_lossless_and_poses_the_newest(godot: GodotProject, service: 
     assert topics["user/pose/body"]["messages"] == 1500
     assert topics["user/pose/body"]["gaps"] == topics["user/gait/event"]["gaps"] == 0
     assert said["statistics"]["drops"] == {}
+
+
+def test_a_game_that_stands_still_loses_the_oldest_events_and_counts_them(
+    godot: GodotProject, service: LiveService
+) -> None:
+    waiting, over = 10_000, 250
+    with godot.start("client.gd", ports(service.endpoints)) as run, Client(service.endpoints) as client:
+        publisher, reader = client.publisher("test"), client.subscribe("gait/event")
+        publisher.wait_ready()
+        reader.wait_ready()
+        run.until("connected")
+        publisher.publish("gait/event", GaitEvent(event="first_step", step=1 + waiting + over))
+        run.until("standing")
+        # No more than what the bus holds for a reader that is behind: another one reads along.
+        for number in range(waiting + over):
+            publisher.publish("gait/event", step(number))
+            assert reader.receive(5.0) is not None
+        while run.until("frames")["statistics"]["overflow"] == 0:
+            pass
+        publisher.publish("gait/event", FINAL)
+        said = run.until("final")
+    assert said["steps"] == list(range(over, waiting + over))
+    assert said["statistics"]["overflow"] == over
+    assert said["statistics"]["topics"]["user/gait/event"]["gaps"] == 0
 
 
 def test_a_service_that_restarts_twice_is_found_again_and_the_loss_is_exact(

@@ -1,6 +1,6 @@
 extends SceneTree
 ## Poses the example's avatar from messages, and says where its bones are. The one argument is JSON:
-## {follow, turned, frames: [topic hex, payload hex], walk_s?}.
+## {follow, frames: [topic hex, payload hex], turned?, age?, updates?, eyes?: "camera" | "origin"}.
 
 const Client := preload("res://addons/foottrack/foottrack_client.gd")
 const Body := preload("res://addons/foottrack/foottrack_body.gd")
@@ -14,6 +14,7 @@ const BONES := ["Hips", "LeftUpperLeg", "LeftLowerLeg", "LeftFoot", "RightUpperL
 class Fixed:
 	extends Client
 	var message: Message
+	var seconds := 0.0
 
 	func _enter_tree() -> void:
 		pass
@@ -28,11 +29,12 @@ class Fixed:
 		return message if message.stream == stream else null
 
 	func age(_message: Message) -> float:
-		return 0.0
+		return seconds
 
 
 var _avatar: Skeleton3D
 var _body: Body
+var _camera: Camera3D
 var _rest := {}
 var _updates := 0
 var _wanted := 0
@@ -46,6 +48,7 @@ func _initialize() -> void:
 	for hex: String in settings["frames"]:
 		frames.append(hex.hex_decode())
 	client.message = Envelope.new().decode(frames)
+	client.seconds = settings.get("age", 0.0)
 	root.add_child(client)
 	_avatar = Avatar.new()
 	_avatar.rotation.y = settings.get("turned", 0.0)
@@ -54,10 +57,18 @@ func _initialize() -> void:
 	_body.follow = settings["follow"]
 	_avatar.add_child(_body)
 	root.add_child(_avatar)
-	if settings.get("eyes", false):
-		var camera := Camera3D.new()
-		root.add_child(camera)
-		_body.eyes = camera
+	if settings.get("eyes", "") == "camera":
+		_body.eyes = Camera3D.new()
+		root.add_child(_body.eyes)
+	elif settings.get("eyes", "") == "origin":
+		var origin := XROrigin3D.new()
+		_camera = XRCamera3D.new()
+		_camera.position = Vector3(0.3, 1.6, 0.2)
+		origin.add_child(_camera)
+		root.add_child(origin)
+		_camera.make_current()
+		_body.stage = origin
+		_body.eyes = origin
 	for bone: String in BONES:
 		_rest[bone] = _avatar.get_bone_global_rest(_avatar.find_bone(bone))
 	_body.modification_processed.connect(_on_update)
@@ -76,6 +87,8 @@ func _on_update() -> void:
 		said[bone] = {"p": _numbers(pose.origin), "q": [turned.x, turned.y, turned.z, turned.w]}
 	if _body.eyes != null:
 		said["eyes"] = {"p": _numbers(_body.eyes.global_position), "forward": _numbers(-_body.eyes.global_basis.z)}
+	if _camera != null:
+		said["eyes"]["camera"] = _numbers(_camera.global_position)
 	print("LINE " + JSON.stringify(said))
 	quit()
 

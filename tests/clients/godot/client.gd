@@ -50,6 +50,11 @@ func _on_event(message: RefCounted) -> void:
 	if message.data["event"] == "stop" and message.data["step"] == FINAL:
 		_say({"kind": "final", "steps": _steps, "poses": _poses, "statistics": _client.statistics()})
 		quit()
+	elif message.data["event"] == "first_step":
+		# The game stands still until the thread has seen so many.
+		_say({"kind": "standing"})
+		while _client.statistics()["topics"][message.topic]["messages"] < message.data["step"]:
+			OS.delay_msec(10)
 	else:
 		_steps.append(message.data["step"])
 

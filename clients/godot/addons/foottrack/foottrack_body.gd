@@ -90,7 +90,8 @@ func _track() -> void:
 	var message := _fresh("pose/body")
 	var body: Dictionary = message.data if message != null else {}
 	var to_skeleton := skeleton.global_transform.affine_inverse() * _stage_in_world()
-	var lift := Vector3(0.0, _humanoid.ankle_height() * skeleton.global_basis.get_scale().y - ankle_height, 0.0)
+	# The soles, not the ankles, are to be as high as the user's.
+	var lift := Vector3.UP * (_humanoid.ankle_height() / to_skeleton.basis.get_scale().y - ankle_height)
 	var ankles := {}
 	var knees := {}
 	for side: String in Humanoid.SIDES:
@@ -203,6 +204,5 @@ func _weight(part: String, known: bool) -> float:
 
 ## Without what `_look` has moved it by: the avatar must not run after its own eyes.
 func _stage_in_world() -> Transform3D:
-	if stage == null:
-		return Transform3D.IDENTITY
-	return stage.global_transform.translated(-_shift) if stage == eyes else stage.global_transform
+	var placed := Frames.stage_in_world(stage)
+	return placed.translated(-_shift) if stage != null and stage == eyes else placed

@@ -21,6 +21,7 @@ signal event_received(message: Message)
 ## fit together.
 signal refused(topic: String, reason: String, detail: String)
 
+## Where the service is. Changes count when the client enters the tree.
 @export var host := "127.0.0.1"
 @export_range(1, 65535) var ingress_port := 7701
 @export_range(1, 65535) var egress_port := 7702
@@ -41,6 +42,8 @@ var _last_refusal_usec := -1_000_000
 
 func _init() -> void:
 	process_priority = -100
+	# A paused game still has a person in it.
+	process_mode = PROCESS_MODE_ALWAYS
 
 
 func _enter_tree() -> void:

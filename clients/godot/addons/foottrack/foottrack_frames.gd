@@ -19,6 +19,14 @@ static func transform(pose: Dictionary) -> Transform3D:
 	return Transform3D(Basis(quaternion(pose["q"])), vector(pose["p"]))
 
 
+## The stage in the world: an XROrigin3D with its world scale, another node, or the world itself for null.
+static func stage_in_world(stage: Node3D) -> Transform3D:
+	if stage == null:
+		return Transform3D.IDENTITY
+	var placed := stage.global_transform
+	return placed.scaled_local(Vector3.ONE * stage.world_scale) if stage is XROrigin3D else placed
+
+
 ## {p, q} of a body in its parent. A scale in it is lost.
 static func pose(of: Transform3D) -> Dictionary:
 	var q := of.basis.get_rotation_quaternion()

@@ -33,8 +33,7 @@ func _process(_delta: float) -> void:
 	var t_usec := Time.get_ticks_usec() + int(lead * 1e6)
 	var body := {"p": null, "q": null, "tracked": is_tracked(), "origin": origin}
 	if body["tracked"]:
-		var stage_in_world := stage.global_transform if stage != null else Transform3D.IDENTITY
-		body.merge(Frames.pose(stage_in_world.affine_inverse() * camera.global_transform), true)
+		body.merge(Frames.pose(Frames.stage_in_world(stage).affine_inverse() * camera.global_transform), true)
 	client.publish("head/pose", t_usec, body)
 
 
