@@ -149,6 +149,9 @@ class FusionSettings(Section):
         default="error-state", description="ours, or the published one that reports compare with"
     )
     floor: bool = Field(default=True, description="a standing sole is on the floor; false where there are stairs")
+    mount_calibration: bool = Field(
+        default=True, description="find in use, and apply, what the camera's mount lacks (not with the reference)"
+    )
     max_output_hz: Positive = 200.0
     silence: Positive = Field(default=0.02, description="when nothing came for so long, a timer publishes, s")
 

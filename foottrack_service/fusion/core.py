@@ -128,6 +128,8 @@ class FusionCore:
                 self._heads.move(p, q)
             for foot in self._feet.values():
                 foot.on_recentred(p, q)
+            if self._watch is not None:
+                self._watch.recentred()
             self._body.reset()
         self._origin = body.origin
         if not body.tracked or body.p is None or body.q is None or max(map(abs, body.p)) > _MOST_DISTANCE:

@@ -36,6 +36,12 @@ class ErrorStateFilter:
         self._pictures = PicturesOnlyFilter(foot)
         self._ladder = Ladder()
 
+    @property
+    def standing(self) -> bool:
+        """Whether the whole foot stood still when the newest measurement was made."""
+        # The pictures' filter knows nothing while the IMU lives.
+        return self._inertial.standing if self._pictures.newest is None else self._pictures.contact
+
     def on_imu(self, sample: ImuSample) -> None:
         """Take a sample, in order of arrival."""
         self._inertial.on_imu(sample)

@@ -108,6 +108,10 @@ class FootFilter(Protocol):
     waits_for_head: bool
     """Whether a fix is held back until the head pose at its own instant is known."""
 
+    @property
+    def standing(self) -> bool:
+        """Whether the foot stood still when the newest measurement was made."""
+
     def on_imu(self, sample: ImuSample) -> None:
         """Take a sample, in order of arrival."""
 

@@ -36,6 +36,8 @@ MISFIT = 1.0
 LEAST_OF_STANCE = 12
 LONGEST_STANCE_S = 3.0
 """A longer one is cut: a person who stands shifts the feet a little."""
+LONGEST_HOLE_S = 0.25
+"""A foot that was not seen for longer may have stepped."""
 RECENT_S = 15.0
 SLIP_TURN, SLIP_SHIFT = math.radians(0.3), 0.005
 """rad, m: a mount that has moved by less has not slipped."""
@@ -106,7 +108,10 @@ class MountCalibrator:
         if fix.kind != "marker" or implausible(fix) is not None:
             return
         stance = self._open.get(side)
-        if stance is not None and (not standing or (fix.t - stance.begun) * 1e-9 > LONGEST_STANCE_S):
+        over = stance is not None and (
+            (fix.t - stance.begun) * 1e-9 > LONGEST_STANCE_S or (fix.t - stance.ended) * 1e-9 > LONGEST_HOLE_S
+        )
+        if over or (stance is not None and not standing):
             self._close(side)
             stance = None
         if not standing:
@@ -130,6 +135,10 @@ class MountCalibrator:
         stance.JWz += J.T @ W @ z
         stance.Wz += W @ z
         stance.square += float(z @ W @ z)
+
+    def recentred(self) -> None:
+        """The stage moved: stances that are under way lie in the old one."""
+        self._open.clear()
 
     def estimate(self) -> MountEstimate | None:
         """What is known so far, None before the first stance is over."""

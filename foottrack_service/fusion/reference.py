@@ -151,6 +151,11 @@ class ReferenceFilter:
         self._average: Array | None = None
         self._next_read = 0
 
+    @property
+    def standing(self) -> bool:
+        """Whether the foot stood still when the newest sample was taken."""
+        return self._stationary
+
     def on_imu(self, sample: ImuSample) -> None:
         """Predict to the sample, then fuse its acceleration unless the foot stands."""
         self._attitude.update(sample)
