@@ -138,14 +138,15 @@ def import_(
 
     Example: foottrack log import walk.msgpack --out walk.mcap
     """
-    from foottrack_service.config import from_toml
+    from foottrack_service.config import load
     from foottrack_service.recording.file import RecordingFile
     from foottrack_service.recording.importer import copy
 
     with _readable_errors():
         text = config.read_text(encoding="utf-8") if config is not None else None
         if text is not None:
-            from_toml(text)
+            # Stricter than what a recording carries: a typing error is to be seen now.
+            load(config)
         recording = _open(file)
         with RecordingFile(out, text) as written:
             copy(_progress(recording.frames(), "Importing"), written)

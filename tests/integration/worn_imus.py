@@ -22,7 +22,7 @@ TILT = rotations.from_axis_angle([0.0, 0.0, 1.0], 0.3)
 def at_rest(t_dev_us: int = 0) -> Imu:
     x, y, z = rotations.unrotate(TILT, [0.0, STANDARD_GRAVITY, 0.0])
     q = tuple(float(v) for v in TILT)
-    return Imu(acc=(float(x), float(y), float(z)), gyro=(0.1, 0.2, 0.3), q=q, t_dev=t_dev_us, t_arr=0)  # type: ignore[arg-type]
+    return Imu(acc=(float(x), float(y), float(z)), gyro=(0.1, 0.2, 0.3), q=q, t_dev=t_dev_us, t_arr=0)
 
 
 class Wearer:
