@@ -1,4 +1,4 @@
-"""What the clients are tested against: the service on ports of its own, a server that lies, a real Godot."""
+"""What the clients are tested against: the service on ports of its own, a server that lies, a real Godot, mono."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import pytest
 from fake_service import FakeService
 from godot_project import GodotProject, find_godot
 from live_service import LiveService
+from unity_mono import MISSING, UnityPackage, has_mono
 
 
 @pytest.fixture
@@ -32,3 +33,11 @@ def godot() -> Iterator[GodotProject]:
         pytest.skip("no Godot 4: run tests/clients/install_godot.sh, or set FOOTTRACK_GODOT to an executable")
     with GodotProject(found) as made:
         yield made
+
+
+@pytest.fixture(scope="session")
+def unity(tmp_path_factory: pytest.TempPathFactory) -> UnityPackage:
+    """The Unity package and its tests, compiled for mono; skipped where there is none."""
+    if not has_mono():
+        pytest.skip(MISSING)
+    return UnityPackage(tmp_path_factory.mktemp("unity") / "tests.exe")
