@@ -90,6 +90,15 @@ def test_a_service_that_restarts_twice_is_found_again_and_the_loss_is_exact(
     assert said["statistics"]["session"] != session
 
 
+def test_a_wrong_port_is_told_in_words(godot: GodotProject, service: LiveService) -> None:
+    right = ports(service.endpoints)
+    with godot.start("client.gd", {**right, "egress": right["control"]}) as run:
+        due = "a ROUTER socket answers to our SUB: is this the right port?"
+        assert run.until("troubled")["why"] == due
+    with godot.start("client.gd", {**right, "control": 1}) as run:
+        run.until("troubled", why="nobody listens at 127.0.0.1:1: is the service running?")
+
+
 def test_head_poses_are_stamped_on_the_bus_clock(godot: GodotProject, service: LiveService) -> None:
     settings = {**ports(service.endpoints), "head": True}
     with Client(service.endpoints) as client, client.subscribe("head/pose") as heads:

@@ -22,6 +22,7 @@ func _initialize() -> void:
 	_client.control_port = settings["control"]
 	_client.connected.connect(func() -> void: _say({"kind": "connected"}))
 	_client.disconnected.connect(func(why: String) -> void: _say({"kind": "disconnected", "why": why}))
+	_client.troubled.connect(func(why: String) -> void: _say({"kind": "troubled", "why": why}))
 	_client.refused.connect(_on_refused)
 	_client.event_received.connect(_on_event)
 	_client.pose_received.connect(func(message: RefCounted) -> void: _poses.append(message.seq))

@@ -13,6 +13,8 @@ const BusThread := preload("wire/bus_thread.gd")
 signal connected
 ## The bus was lost; `why` is for a person.
 signal disconnected(why: String)
+## Something keeps a connection from standing: nobody listens, something else does, it stalls. Told when it changes.
+signal troubled(why: String)
 ## The newest of a stream of which only the newest counts: `pose/body`, `pose/ik`, `gait/state`.
 signal pose_received(message: Message)
 ## Each message of the other streams, in order: `gait/event`, `calibration`, `sys/...`.
@@ -37,6 +39,7 @@ var _thread: BusThread
 var _newest := {}
 var _sid := ""
 var _was_connected := false
+var _trouble := ""
 var _last_refusal_usec := -1_000_000
 
 
@@ -64,6 +67,7 @@ func _exit_tree() -> void:
 func _process(_delta: float) -> void:
 	var batch := _thread.take()
 	_notice_connection()
+	_notice_trouble()
 	for message in batch.every:
 		_newest[message.topic] = message
 		event_received.emit(message)
@@ -128,7 +132,17 @@ func _notice_connection() -> void:
 	if is_now:
 		connected.emit()
 	else:
-		disconnected.emit(_thread.state().get("fault", ""))
+		disconnected.emit(_thread.fault())
+
+
+func _notice_trouble() -> void:
+	var trouble := _thread.fault()
+	if trouble == _trouble:
+		return
+	_trouble = trouble
+	if not trouble.is_empty():
+		push_warning("foottrack: " + trouble)
+		troubled.emit(trouble)
 
 
 func _tell(refusal: Array) -> void:

@@ -90,6 +90,14 @@ func offset() -> int:
 	return found
 
 
+## What keeps a connection from standing, for a person; empty when nothing does.
+func fault() -> String:
+	_mutex.lock()
+	var found: String = _state.get("fault", "")
+	_mutex.unlock()
+	return found
+
+
 ## Whether all subscriptions are in force.
 func is_live() -> bool:
 	_mutex.lock()
@@ -201,8 +209,17 @@ static func _describe(down: EgressLink, up: IngressLink, asks: ControlLink) -> D
 		"violations": down.violations + up.violations + asks.violations,
 		"stalls": down.stalls + up.stalls + asks.stalls,
 		"bad_answers": asks.bad_answers,
-		"fault": "" if down.is_live else down.last_fault,
+		"fault": _fault(down, up, asks),
 	}
+
+
+## What keeps one of the three connections from standing, for a person.
+static func _fault(down: EgressLink, up: IngressLink, asks: ControlLink) -> String:
+	if not down.is_live:
+		return down.last_fault
+	if not up.is_live():
+		return up.last_fault
+	return "" if asks.is_ready() else asks.last_fault
 
 
 static func _pause(down: EgressLink, up: IngressLink, asks: ControlLink) -> int:
