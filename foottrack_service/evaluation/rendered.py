@@ -48,7 +48,7 @@ def with_pictures(scenario: Scenario, feet: Feet = "mild", fps: float = 60.0) ->
 def found_in_pictures(
     task: str, seed: int, seconds: float, feet: Feet, settings_json: str, fps: float
 ) -> tuple[tuple[int, Message], ...]:
-    """``marker/*`` and ``depth/*`` of a scenario that begins at 0, with their arrivals, ns; kept for the next filter."""
+    """``marker/*`` and ``depth/*`` of a scenario that begins at 0, with arrivals, ns; kept for the next filter."""
     settings = Settings.model_validate_json(settings_json)
     cv2.setNumThreads(1)
     scene = {"task": task, "seed": seed, "seconds": seconds, "feet": feet, "fps": fps, "start": 0}

@@ -17,9 +17,8 @@ SILENCE_S = 0.25
 MAX_SPEED_M_S = 6.0
 MAX_RATE_RAD_S = 25.0
 """No head is faster: quick turns of a head reach 12 rad/s, lunges 3 m/s."""
-SLACK_M = 0.03
-SLACK_RAD = 0.1
-"""Noise, and stamps that err by a few ms."""
+SLACK_S = 0.005
+"""Stamps err by so much, and poses by 3 cm and 7 deg at these speeds."""
 
 
 class HeadMessage(NamedTuple):
@@ -56,13 +55,14 @@ class HeadStream:
         if self._last is not None and t <= self._last[0]:
             self.drops["repeated"] += 1
             return None
-        if not self._skip_check and self._last is not None and not _reachable(self._last, (t, head)):
-            if self._suspect is None or not _reachable(self._suspect, (t, head)):
+        if self._last is not None and not self._skip_check:
+            if self._suspect is not None and _way_s(self._suspect[1], head) < _way_s(self._last[1], head):
+                self._origin += 1
+                self.taken["jumps"] += 1
+            elif _way_s(self._last[1], head) > (t - self._last[0]) * 1e-9 + SLACK_S:
                 self._suspect = (t, head)
                 self.drops["glitch"] += 1
                 return self._untracked(t)
-            self._origin += 1
-            self.taken["jumps"] += 1
         moved, self._recentred = self._recentred, None
         self._skip_check, self._suspect = False, None
         try:
@@ -95,11 +95,10 @@ class HeadStream:
         return HeadMessage(t, HeadPose(tracked=False, origin=self._origin))
 
 
-def _reachable(a: tuple[int, Rigid], b: tuple[int, Rigid]) -> bool:
-    dt = (b[0] - a[0]) * 1e-9
-    far = float(np.linalg.norm(b[1].p - a[1].p))
-    turned = float(rotations.angle_between(a[1].q, b[1].q))
-    return far <= MAX_SPEED_M_S * dt + SLACK_M and turned <= MAX_RATE_RAD_S * dt + SLACK_RAD
+def _way_s(a: Rigid, b: Rigid) -> float:
+    """How long the fastest head takes from a to b."""
+    far = float(np.linalg.norm(b.p - a.p))
+    return max(far / MAX_SPEED_M_S, float(rotations.angle_between(a.q, b.q)) / MAX_RATE_RAD_S)
 
 
 def _tuple(values: rotations.Array) -> tuple[float, ...]:
