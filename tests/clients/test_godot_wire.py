@@ -18,16 +18,12 @@ pytestmark = pytest.mark.engine
 VECTORS = Path(__file__).parents[2] / "protocol/vectors"
 
 
-def inside(godot: GodotProject, folder: str) -> str:
-    return f"res://{(godot.folder / folder).relative_to(godot.folder)}"
-
-
 def test_every_golden_vector_is_understood_or_refused_for_its_reason(godot: GodotProject) -> None:
     counts = {
         path.name: len(json.loads(path.read_text(encoding="utf-8"))["vectors"]) for path in VECTORS.glob("*.json")
     }
     invalid = counts.pop("invalid.json")
-    result = godot.run("vectors.gd", inside(godot, "vectors"))
+    result = godot.run("vectors.gd", "res://vectors")
     assert result["differences"] == []
     assert (result["valid"], result["invalid"]) == (sum(counts.values()), invalid)
 
@@ -44,7 +40,7 @@ def test_a_vector_that_is_wrong_is_noticed(godot: GodotProject) -> None:
     tampered(VECTORS / "truth.json", lambda vector: vector["message"]["data"]["p"].__setitem__(1, 7.0))
     tampered(VECTORS / "log_record.json", lambda vector: vector["message"].update(src="somebody else"))
     tampered(VECTORS / "invalid.json", lambda vector: vector.update(reason="body"))
-    differences = godot.run("vectors.gd", inside(godot, "tampered"))["differences"]
+    differences = godot.run("vectors.gd", "res://tampered")["differences"]
     assert len(differences) == 4, differences  # the body also differs when it is sent again
 
 
