@@ -218,7 +218,7 @@ def test_a_server_that_lies_is_survived(fake: FakeService) -> None:
 
 
 def test_libzmq_s_zombies_are_revived(run: Run, fake: FakeService) -> None:
-    rude = rude_greetings()["another protocol"]
+    rude = rude_greetings()["READY cut short"]
 
     def lie_then_serve() -> None:
         for accept, socket_type in ((fake.egress, b"XPUB"), (fake.ingress, b"XSUB")):
