@@ -6,6 +6,7 @@ what is set here holds for the encrypted endpoint alone and the plain one on loo
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 import time
@@ -111,6 +112,9 @@ class Doorkeeper:
         finally:
             for monitor in [*self._monitors, *(monitor for _, monitor in self._arrivals)]:
                 monitor.close(0)
+            # A socket's closing frees its address later.
+            with contextlib.suppress(zmq.ZMQError):
+                self._zap.unbind(_ZAP)
             self._zap.close(0)
 
     def _answer(self, frames: list[bytes]) -> bool:
