@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from foottrack_protocol.frames import SIDES
 from foottrack_protocol.messages import Side
@@ -14,6 +15,7 @@ from foottrack_service.config import Settings
 from foottrack_service.evaluation import gait_metrics as metrics
 from foottrack_service.evaluation.gait_cases import GaitCase
 from foottrack_service.evaluation.gait_runs import MODES, GaitRun, Mode, feet_of, run_gait
+from foottrack_service.gait.reference_machine import RATE_HZ
 from foottrack_service.rotations import Array
 from foottrack_service.simulation.scenario import Scenario, simulate
 from foottrack_service.simulation.truth import FootTrack
@@ -65,7 +67,7 @@ def run_case(case: GaitCase) -> CaseFigures:
         motion=case.motion,
     )
     instants = feet_of(scenario.messages(), settings)
-    return CaseFigures(case, {mode: _figures(run_gait(instants, settings, mode), scenario, case) for mode in MODES})
+    return CaseFigures(case, {mode: _figures(run_gait(instants, settings, mode), mode, scenario) for mode in MODES})
 
 
 def summary(figures: Iterable[CaseFigures]) -> dict[str, Any]:
@@ -74,15 +76,17 @@ def summary(figures: Iterable[CaseFigures]) -> dict[str, Any]:
     return {mode: _pooled([(f.case, f.modes[mode]) for f in figures], mode) for mode in MODES}
 
 
-def _figures(run: GaitRun, scenario: Scenario, case: GaitCase) -> ModeFigures:
+def _figures(run: GaitRun, mode: Mode, scenario: Scenario) -> ModeFigures:
     out = ModeFigures()
     out.walked = sum(event.name == "first_step" for event in run.events)
     out.way = float(np.sum(run.speed[1:] * np.diff(run.t))) if len(run.t) > 1 else 0.0
     walking = run.speed > 0.0
     if np.any(walking):
         out.speeds = run.speed[walking][::20].tolist()
+    frames = _own_frames(run, mode)
     for side in SIDES:
         track = scenario.truth.feet[side]
+        out.jump = max(out.jump, float(np.max(metrics.jumps_m(run.t[frames], run.feet[side][frames]), initial=0.0)))
         leaves, strikes = _instants(track, scenario.seconds)
         matched = metrics.match(leaves, run.lifted[side], 0.5)
         out.steps += matched.true
@@ -101,7 +105,6 @@ def _feet(out: ModeFigures, run: GaitRun, side: Side, track: FootTrack, leaves: 
     t, target, speed = run.t[keep], run.feet[side][keep], run.speed[keep]
     if len(t) < 10:
         return
-    out.jump = max(out.jump, float(np.max(_own_frames_jump(t, target))))
     heel, toe = track.contact(t)
     out.skates += metrics.skates_m(t, target[:, 0], target[:, 1], speed, heel | toe)
     user = track.pose(t)[0][:, 1]
@@ -114,13 +117,12 @@ def _feet(out: ModeFigures, run: GaitRun, side: Side, track: FootTrack, leaves: 
                 out.lags.append(found[1])
 
 
-def _own_frames_jump(t: Array, target: Array) -> Array:
-    """At the rate at which the mode itself moves: a target held between its frames is no frame."""
-    moves = np.concatenate([[True], np.any(np.diff(target, axis=0) != 0.0, axis=1)])
-    # Where it stands still for longer, the frame before it moves again is one as well.
-    frames = moves | np.concatenate([moves[1:], [True]]) if np.count_nonzero(moves) > 0.5 * len(moves) else moves
-    found = metrics.jumps_m(t[frames], target[frames])
-    return found if len(found) else np.zeros(1)
+def _own_frames(run: GaitRun, mode: Mode) -> npt.NDArray[np.intp]:
+    """Indices of the outputs at which a mode's targets are new: the reference holds them from frame to frame."""
+    if mode != "reference":
+        return np.arange(len(run.t))
+    frames = np.searchsorted(run.t, np.arange(run.t[0], run.t[-1], 1.0 / RATE_HZ) + 1e-3)
+    return np.asarray(frames[frames < len(run.t)])
 
 
 def _instants(track: FootTrack, seconds: float) -> tuple[Array, Array]:

@@ -44,18 +44,23 @@ def match(true: Array, found: Array, tolerance: float = TOLERANCE_S) -> Matched:
 
 
 def jumps_m(t: Array, p: Array) -> Array:
-    """How much more a target moves in one output frame than at the pace of either frame beside it, m, (n - 1,).
+    """How far a target's move in one output frame is from any pace between those of the frames beside it, m, (n - 1,).
 
-    ``t`` (n,) s, ``p`` (n, k) m. Steady motion, and any change of pace, gives 0; a jump gives its own length.
+    ``t`` (n,) s, ``p`` (n, k) m. Steady motion and changes of pace give 0; a jump gives its own length.
     """
     keep = np.concatenate([[True], np.diff(t) > _LEAST_FRAME_S])
     t, p = t[keep], p[keep]
     if len(t) < 4:
         return np.zeros(max(0, len(t) - 1))
     dt = np.diff(t)
-    pace = np.linalg.norm(np.diff(p, axis=0), axis=1) / dt
+    pace = np.diff(p, axis=0) / dt[:, None]
+    before, now, after = pace[:-2], pace[1:-1], pace[2:]
+    change = after - before
+    length2 = np.sum(change * change, axis=1)
+    share = np.sum((now - before) * change, axis=1) / np.where(length2 > 0.0, length2, 1.0)
+    nearest = before + np.clip(share, 0.0, 1.0)[:, None] * change
     beyond = np.zeros(len(pace))
-    beyond[1:-1] = np.maximum(pace[1:-1] - np.maximum(pace[:-2], pace[2:]), 0.0) * dt[1:-1]
+    beyond[1:-1] = np.linalg.norm(now - nearest, axis=1) * dt[1:-1]
     return beyond
 
 

@@ -22,6 +22,8 @@ _SWING_SPEED = 0.5
 """m/s of a heel's marker over the floor: faster is a swing."""
 _LEAST_SWING_S = 0.15
 _WINDOW_S = 4.0
+_LEAST_BOB = 0.02
+"""m, from the lowest to the highest: a second with less is a pause."""
 _SLOW_S = 0.9
 """What changes over longer than this is no bob."""
 _LEAST_REGULAR = 0.5
@@ -152,7 +154,8 @@ def _bob_hz(t: Array, height: Array) -> float | None:
     own = np.correlate(y, y, "full")[len(y) - 1 :] / np.arange(len(y), 0, -1)
     low, high = int(rate / 3.2), int(rate / 1.3)
     best = low + int(np.argmax(own[low:high]))
-    if own[best] < _LEAST_REGULAR * own[0] or np.ptp(y) < 0.02 or not low < best < high - 1:
+    pauses = any(np.ptp(part) < _LEAST_BOB for part in np.array_split(y, round(t[-1] - t[0])))
+    if pauses or own[best] < _LEAST_REGULAR * own[0] or not low < best < high - 1:
         return None
     before, at, after = own[best - 1 : best + 2]
     return float(rate / (best + 0.5 * (before - after) / (before - 2.0 * at + after)))

@@ -26,6 +26,8 @@ _PEAK = 0.12
 """m: how high the feet are lifted that nobody sees."""
 _SWING_SHARE = 0.75
 """Of the interval."""
+_DELAY_NS = 90_000_000
+"""From the head's lowest point to the step, which is seldom known earlier: an even delay keeps an even pace."""
 _HALF_STANCE = 0.1
 """m."""
 _HOLE_S = 0.3
@@ -104,13 +106,14 @@ class HeadBob:
             self._intervals.clear()
             return
         self._intervals.append(interval)
-        self._begun[self._next] = self._t
+        self._begun[self._next] = max(low + _DELAY_NS, self._t or 0)
         self._lasts[self._next] = _SWING_SHARE * min(sum(self._intervals) / len(self._intervals), 0.8)
         self._next = 1 - self._next
 
     def _foot(self, t: int, index: int) -> FootSample:
         begun, lasts = self._begun[index], self._lasts[index]
         share = 1.0 if begun is None else (t - begun) * 1e-9 / lasts
+        share = share if share > 0.0 else 1.0
         height = vy = 0.0
         if share < 1.0:
             height = _PEAK * math.sin(math.pi * share) ** 2

@@ -31,6 +31,8 @@ _DOWN, _UP = 0.004, 0.03
 """m: a foot below the first stands, above the second it flies free; in between it goes along with the ground."""
 _SPEED_S = 0.15
 """s: how fast the avatar's speed follows the model's."""
+_GAINS = 12.0
+"""m/s^2: and at most so; a foot that was out of reach and leaves would set it free at once."""
 _RETURN_AFTER_S = 1.5
 """s of standing after which the legs come back under the hips [Z]."""
 _RETURN_S = 0.4
@@ -142,7 +144,7 @@ class WalkingLegs:
     def __init__(self, leg: float) -> None:
         self._leg = leg
         self._legs = (_Leg(), _Leg())
-        self._speed = 0.0
+        self._speed = self._shown = 0.0
         self._returning: int | None = None
         self._returned_s = 0.0
 
@@ -152,7 +154,8 @@ class WalkingLegs:
         self._speed += (wanted - self._speed) * (1.0 - math.exp(-dt / _SPEED_S))
         if wanted == 0.0 and self._speed < 0.02:
             self._speed = max(0.0, self._speed - 0.1 * dt)
-        speed = self._speed * self._room(feet)
+        speed = min(self._speed * self._room(feet), self._shown + _GAINS * dt)
+        self._shown = speed
         for index, (leg, foot) in enumerate(zip(self._legs, feet, strict=True)):
             if foot.phase != "stance":
                 if self._returning == index:

@@ -1,0 +1,54 @@
+"""Metrics on signals with known answers."""
+
+import numpy as np
+import pytest
+
+from foottrack_service.evaluation.gait_cases import HELD_OUT_SEED, cases
+from foottrack_service.evaluation.gait_metrics import correlation_and_lag, jumps_m, match, skates_m
+
+T = np.arange(0.0, 10.0, 0.005)
+
+
+def test_match_takes_each_instant_once_and_the_nearest_first():
+    found = match(np.array([1.0, 2.0, 3.0]), np.array([1.05, 1.1, 2.9, 9.0]))
+    assert (found.true, found.found, found.extra) == (3, 2, 2)
+    assert sorted(found.errors) == pytest.approx([-0.1, 0.05])
+    assert match(np.array([]), np.array([1.0])).extra == 1
+
+
+def test_a_jump_is_measured_and_motion_is_not():
+    smooth = np.stack([np.sin(8.0 * T), np.cos(8.0 * T)], axis=-1)
+    assert np.max(jumps_m(T, smooth)) < 1e-3
+    ramp = np.outer(np.where(T > 5.0, T - 5.0, 0.0), [2.0, 0.0])
+    assert np.max(jumps_m(T, ramp)) < 1e-9
+    smooth[T > 5.0, 0] += 0.05
+    assert np.max(jumps_m(T, smooth)) == pytest.approx(0.05, rel=0.1)
+
+
+def test_a_foot_that_goes_back_as_fast_as_the_avatar_goes_does_not_skate():
+    z = 0.3 - 1.2 * (T % 0.5)
+    planted = T % 0.5 < 0.45
+    height, speed = np.where(planted, 0.0, 0.1), np.full(len(T), 1.2)
+    assert max(skates_m(T, z, height, speed, planted)) < 1e-9
+    assert np.median(skates_m(T, z, height, 0.5 * speed, planted)) == pytest.approx(0.6 * 0.445, rel=0.02)
+
+
+def test_lag_and_correlation():
+    user, late = np.sin(2 * np.pi * T), np.sin(2 * np.pi * (T - 0.03))
+    r, lag = correlation_and_lag(T, late, user)
+    assert lag == pytest.approx(0.03, abs=0.001)
+    assert r == pytest.approx(np.cos(2 * np.pi * 0.03), abs=0.01)
+    assert correlation_and_lag(T, np.zeros(len(T)), user) is None
+
+
+def test_every_cadence_meets_every_peak_on_seeds_that_nothing_was_tuned_on():
+    found = cases([1, 2])
+    assert all(case.seed > HELD_OUT_SEED for case in found)
+    assert len({(case.cadence, case.peak) for case in found if case.kind == "in place" and not case.turn}) == 20
+    assert {(case.imu_hz, case.camera) for case in found} == {
+        (100.0, True),
+        (100.0, False),
+        (400.0, True),
+        (400.0, False),
+    }
+    assert len({case.height for case in found if case.kind == "in place"}) == 3
