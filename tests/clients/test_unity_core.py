@@ -74,7 +74,9 @@ def decoded(unity: UnityPackage, folder: Path, chosen: list[dict[str, Any]]) -> 
 @needs_mono
 @pytest.mark.engine
 def test_the_core_compiles_alone_and_without_a_warning(tmp_path: Path) -> None:
-    assert compile_csharp(["Runtime/Core"], tmp_path / "core.dll", "-target:library", "-noconfig", "-r:System.dll") == ""
+    assert (
+        compile_csharp(["Runtime/Core"], tmp_path / "core.dll", "-target:library", "-noconfig", "-r:System.dll") == ""
+    )
 
 
 @pytest.mark.engine
@@ -138,7 +140,7 @@ def test_the_package_is_one_that_unity_takes() -> None:
 def test_every_asset_has_its_meta_file_with_an_id_of_its_own() -> None:
     """In a package that Unity got from a registry or by git, an asset without one is ignored."""
     due = metas()
-    there = {path for path in PACKAGE.rglob("*.meta")}
+    there = set(PACKAGE.rglob("*.meta"))
     assert {path for path in due if path not in there} == set(), "run python tests/clients/unity_metas.py"
     assert there - due.keys() == set()
     ids = [guid_of(path) for path in there]

@@ -9,8 +9,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from foottrack_client import Endpoints
 from godot_project import LINE, TIMEOUT_S, GodotRun
+
+from foottrack_client import Endpoints
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "clients/unity"

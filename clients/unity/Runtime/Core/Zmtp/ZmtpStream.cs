@@ -98,11 +98,18 @@ namespace Foottrack
 
         public void Write(byte[] bytes, int offset, int count)
         {
-            while (count > 0)
+            try
             {
-                int sent = _socket.Send(bytes, offset, count, SocketFlags.None);
-                offset += sent;
-                count -= sent;
+                while (count > 0)
+                {
+                    int sent = _socket.Send(bytes, offset, count, SocketFlags.None);
+                    offset += sent;
+                    count -= sent;
+                }
+            }
+            catch (SocketException e) when (IsTimeout(e.SocketErrorCode))
+            {
+                throw new LinkException(LinkException.Cause.Stall, Where + " takes nothing any more");
             }
         }
 
@@ -125,6 +132,11 @@ namespace Foottrack
                 }
             }
             throw new LinkException(LinkException.Cause.Stall, Where + " began a message and stalled");
+        }
+
+        private static bool IsTimeout(SocketError error)
+        {
+            return error == SocketError.TimedOut || error == SocketError.WouldBlock;
         }
 
         private bool Fill()
