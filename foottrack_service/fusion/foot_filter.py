@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from foottrack_protocol.messages import Side
+from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings, Placement
 from foottrack_service.fusion.compiled import is_compiled
 from foottrack_service.fusion.foot_filter_inertial import InertialFilter
@@ -35,6 +36,7 @@ class ErrorStateFilter:
         self._inertial = InertialFilter(foot, side, floor=floor)
         self._pictures = PicturesOnlyFilter(foot)
         self._ladder = Ladder()
+        self._device_q: Array | None = None
 
     @property
     def standing(self) -> bool:
@@ -47,6 +49,7 @@ class ErrorStateFilter:
         self._inertial.on_imu(sample)
         if self._inertial.begun:
             self._ladder.saw_imu(self._inertial.newest)
+            self._device_q = sample.q if self._inertial.newest == sample.t else self._device_q
 
     def on_fix(self, fix: OpticalFix, now: int) -> Verdict:
         """Take an optical fix that arrives at ``now``, later than its own ``t``."""
@@ -67,8 +70,16 @@ class ErrorStateFilter:
         self._inertial.set_floor(height)
 
     def on_imu_yaw(self, yaw: float) -> None:
-        """The yaw of the device's own frame in the stage was calibrated, rad."""
-        self._inertial.set_imu_yaw(yaw)
+        """The yaw of the device's own frame in the stage was calibrated, rad: counts until a fix is accepted."""
+        inertial = self._inertial
+        inertial.set_imu_yaw(yaw)
+        if self._device_q is None or self._ladder.age(inertial.newest) is not None:
+            return
+        # So far the foot's first attitude was a guess: it turns on its spot.
+        device = rot.multiply(inertial.state[0][6:10], rot.conjugate(self._device_q))
+        turn = rot.from_yaw(yaw - rot.yaw_of(device))
+        ankle = inertial.predicted(inertial.newest)[0]
+        inertial.move(ankle - rot.rotate(turn, ankle), turn)
 
     def on_imu_placement(self, placement: Placement) -> None:
         """The sensor's place on the shoe was calibrated."""

@@ -168,6 +168,50 @@ def test_calibrations_are_applied_when_they_arrive():
     assert math.dist(leg.hip, leg.knee) == pytest.approx(0.5)
 
 
+def test_a_heading_turns_a_foot_that_no_camera_has_seen_on_its_spot():
+    core = FusionCore(Settings())
+    values = m.HeadingValues(yaw=0.0, imu_yaw=m.PerSideYaw(left=1.0))
+    feed(core, [imu(t * 10 * MS) for t in range(20)])
+    heading = message("calibration", 200 * MS, m.HeadingCalibration(values=values))
+    outs = feed(core, [heading, imu(200 * MS), imu(210 * MS), heading, imu(220 * MS)])
+    for out in (out for out in outs if out.stream == "pose/body"):
+        assert float(rot.yaw_of(out.data.left.ankle.q)) == pytest.approx(1.0, abs=1e-3)
+        assert math.dist(out.data.left.ankle.p, (-0.1, 0.09, 0.0)) < 1e-3
+
+
+def test_a_calibration_that_comes_again_changes_nothing():
+    """It comes every 5 s, and a filter that is placed anew has to find its foot again."""
+    place = m.ImuValues(side="left", acc_bias=(0, 0, 0), gyro_bias=(0, 0, 0), p=(0, 0.02, 0), q=IDENTITY)
+    placed = m.ImuCalibration(values=place)
+    results = []
+    for repeats in (0, 3):
+        core = FusionCore(Settings())
+        outs = feed(core, [message("calibration", 0, placed), head(0), imu(0)])
+        for k in range(1, 120):
+            t = k * 10 * MS
+            outs += feed(core, [head(t), imu(t), marker(t, (-0.1, -1.55, -0.15), q=IDENTITY)])
+            if repeats and k % 30 == 0:
+                outs += feed(core, [message("calibration", t, placed)])
+        results.append([out for out in outs if out.stream == "pose/body"])
+    assert results[0][-1].data.left.stage == "marker"
+    assert results[0][-1].data == results[1][-1].data
+
+
+@pytest.mark.parametrize("solver", ["two-bone", "fabrik"])
+def test_bones_of_what_is_published_have_their_lengths(solver):
+    core = FusionCore(Settings(body={"solver": solver}, fusion=FusionSettings(filter="reference")))
+    body = None
+    for k in range(1, 60):
+        t = k * 10 * MS
+        p = (-0.1, -1.5 + 0.3 * abs(math.sin(0.1 * k)), -0.2 * math.sin(0.1 * k))
+        for out in feed(core, [head(t), imu(t), marker(t, p), marker(t, (0.1, -1.5, -0.1), side="right")]):
+            body = out.data if out.stream == "pose/body" else body
+    skeleton = core._body.skeleton
+    for leg in (body.left, body.right):
+        assert math.dist(leg.hip, leg.knee) == pytest.approx(skeleton.thigh, abs=1e-6)
+        assert math.dist(leg.knee, leg.ankle.p) == pytest.approx(skeleton.shank, abs=1e-6)
+
+
 def test_a_mount_correction_counts_only_for_the_mount_it_was_found_for():
     config = AT_ONCE
     for base, shift in (("another", 0.0), (config.camera.mount_hash, 0.1)):
