@@ -45,7 +45,10 @@ SLIP_SIGMAS = 4.0
 SLIP_STANCES = 3
 """So many stances in a row must say so."""
 GOOD_TURN, GOOD_SHIFT = math.radians(0.1), 0.002
-"""rad, m per axis SD: what a correction must reach to be used."""
+"""rad, m per axis SD: what a calibration on request must reach."""
+
+USEFUL_FOOT = 0.003
+"""m per axis SD where the feet are: what the feet's filters leave in any case."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,16 +62,24 @@ class MountEstimate:
     """m per axis."""
     sigma_q: float
     """rad per axis."""
+    sigma_foot: float
+    """m per axis: how unsure the correction is where the feet were seen. Turn and shift make up for each other there,
+    so this is known long before either."""
 
     @property
     def good(self) -> bool:
-        """Whether it is known well enough to be applied."""
+        """Whether the mount itself is known."""
         return self.sigma_p <= GOOD_SHIFT and self.sigma_q <= GOOD_TURN
+
+    @property
+    def useful(self) -> bool:
+        """Whether feet are better off with it."""
+        return self.sigma_foot <= USEFUL_FOOT
 
 
 @dataclass(slots=True)
 class _Stance:
-    """Sums over one stance: of W, J' W J, J' W, J' W z, W z and z' W z (``square``)."""
+    """Sums over one stance: of W, J' W J, J' W, J' W z, W z, z' W z (``square``) and p."""
 
     begun: int
     ended: int
@@ -79,6 +90,7 @@ class _Stance:
     JWz: Array
     Wz: Array
     square: float
+    p: Array
 
     def information(self) -> tuple[Array, Array]:
         """What it says of the 7 unknowns with its own point eliminated: matrix (7, 7) and vector (7,)."""
@@ -98,6 +110,7 @@ class MountCalibrator:
     def __init__(self) -> None:
         self._open: dict[Side, _Stance] = {}
         self._matrix, self._vector = np.zeros((7, 7)), np.zeros(7)
+        self._seen, self._fixes = np.zeros(3), 0
         self._recent: deque[tuple[int, Array, Array]] = deque()
         self._slipping = 0
         self.slips = 0
@@ -118,13 +131,13 @@ class MountCalibrator:
             return
         R = rot.to_matrix(fix.head.q)
         z = fix.head.p + R @ fix.p
-        x, y, w = fix.p
-        cross = np.array([[0.0, -w, y], [w, 0.0, -x], [-y, x, 0.0]])
-        J = np.hstack([R @ cross, -R, -(R @ fix.p)[:, None]])
+        J = np.hstack([R @ _cross(fix.p), -R, -(R @ fix.p)[:, None]])
         noise = HEAD_NOISE**2 + HEAD_TURN_NOISE**2 * float(fix.p @ fix.p)
         W = _inverse(R @ fix.cov @ R.T + noise * np.eye(3)) / CORRELATED
         if stance is None:
-            self._open[side] = _Stance(fix.t, fix.t, 1, W, J.T @ W @ J, J.T @ W, J.T @ W @ z, W @ z, float(z @ W @ z))
+            self._open[side] = _Stance(
+                fix.t, fix.t, 1, W, J.T @ W @ J, J.T @ W, J.T @ W @ z, W @ z, float(z @ W @ z), fix.p
+            )
             return
         if stance.n >= LEAST_OF_STANCE and self._surprise(stance, J, W, z) > OUTLIER:
             return
@@ -135,6 +148,7 @@ class MountCalibrator:
         stance.JWz += J.T @ W @ z
         stance.Wz += W @ z
         stance.square += float(z @ W @ z)
+        stance.p = stance.p + fix.p
 
     def recentred(self) -> None:
         """The stage moved: stances that are under way lie in the old one."""
@@ -146,8 +160,13 @@ class MountCalibrator:
             return None
         values, covariance = _solved(self._matrix, self._vector)
         sd = np.sqrt(np.diag(covariance))
+        effect = np.hstack([-_cross(self._seen / self._fixes), np.eye(3)])
         return MountEstimate(
-            values[3:6], rot.from_rotation_vector(values[:3]), float(sd[3:6].max()), float(sd[:3].max())
+            values[3:6],
+            rot.from_rotation_vector(values[:3]),
+            float(sd[3:6].max()),
+            float(sd[:3].max()),
+            math.sqrt(float(np.trace(effect @ covariance[:6, :6] @ effect.T)) / 3.0),
         )
 
     def _close(self, side: Side) -> None:
@@ -160,6 +179,7 @@ class MountCalibrator:
         self._recent.append((stance.ended, matrix, vector))
         while (stance.ended - self._recent[0][0]) * 1e-9 > RECENT_S:
             self._recent.popleft()
+        self._seen, self._fixes = self._seen + stance.p, self._fixes + stance.n
         self._matrix += matrix
         self._vector += vector
         self._notice_a_slip()
@@ -192,6 +212,11 @@ class MountCalibrator:
 def _solved(matrix: Array, vector: Array) -> tuple[Array, Array]:
     covariance = _inverse(matrix + np.diag(1.0 / PRIOR**2))
     return covariance @ vector, covariance
+
+
+def _cross(v: Array) -> Array:
+    x, y, z = v
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _inverse(matrix: Array) -> Array:

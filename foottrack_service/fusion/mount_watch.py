@@ -50,12 +50,12 @@ class MountWatch:
         self._calibrator.recentred()
 
     def found(self, now: int) -> MountCalibration | None:
-        """The correction, every 5 s once it is good; ``now`` in ns."""
+        """The correction, every 5 s once feet are better off with it; ``now`` in ns."""
         if self._due is not None and 0 <= self._due - now <= PERIOD_S * 1e9:
             return None
         self._due = now + round(PERIOD_S * 1e9)
         estimate = self._calibrator.estimate()
-        if estimate is None or not estimate.good:
+        if estimate is None or not estimate.useful:
             return None
         p, q = estimate.p.tolist(), estimate.q.tolist()
         if not math.isfinite(sum(p) + sum(q)):

@@ -53,7 +53,7 @@ def test_nothing_is_said_before_a_stance_is_over_and_little_before_the_head_has_
     seen(calibrator, 0.0, 4.0, NONE)
     found = calibrator.estimate()
     assert found is not None
-    assert not found.good
+    assert not found.good and not found.useful
 
 
 def test_a_slipped_mount_is_noticed_and_found_anew() -> None:
