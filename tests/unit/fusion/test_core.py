@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from foottrack_protocol import Message, decode, encode
 from foottrack_protocol import messages as m
-from foottrack_protocol.frames import STANDARD_GRAVITY
+from foottrack_protocol.frames import STANDARD_GRAVITY, TAG_ON_INSTEP
 from foottrack_service import rotations as rot
 from foottrack_service.config import FusionSettings, Settings
 from foottrack_service.fusion.core import FusionCore
@@ -189,7 +189,7 @@ def test_a_calibration_that_comes_again_changes_nothing():
         outs = feed(core, [message("calibration", 0, placed), head(0), imu(0)])
         for k in range(1, 120):
             t = k * 10 * MS
-            outs += feed(core, [head(t), imu(t), marker(t, (-0.1, -1.55, -0.15), q=IDENTITY)])
+            outs += feed(core, [head(t), imu(t), marker(t, (-0.1, -1.55, -0.15), q=TAG_ON_INSTEP)])
             if repeats and k % 30 == 0:
                 outs += feed(core, [message("calibration", t, placed)])
         results.append([out for out in outs if out.stream == "pose/body"])
