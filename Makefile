@@ -5,12 +5,13 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 ARGS ?=
 
-.PHONY: help setup demo test test-clients lint lock schemas bench clean
+.PHONY: help setup demo test test-clients engines lint lock schemas bench clean
 
 help:
 	@echo "make demo     two feet tracked on simulated hardware (options: make demo ARGS='--seconds 30 --task line')"
 	@echo "make test     lint, types, import directions and the whole test suite"
-	@echo "make test-clients  installs engines where it can, and runs the clients' tests alone"
+	@echo "make engines  install what optional tests need, as far as it can be (Godot, mono, libraries)"
+	@echo "make test-clients  the same, and the clients' tests alone"
 	@echo "make lint     ruff, mypy --strict, import directions"
 	@echo "make bench    latency and throughput beside their floors"
 	@echo "make schemas  regenerate protocol/schema, protocol/vectors and the tables in SPEC.md"
@@ -40,9 +41,13 @@ lint: setup
 test: lint
 	$(BIN)/pytest $(ARGS)
 
-# An engine that cannot be installed here is no failure: its tests are skipped, and say so.
-test-clients: setup
+# What cannot be installed here is no failure: its tests are skipped, and say so.
+engines:
 	-tests/clients/install_godot.sh
+	-tests/clients/install_mono.sh
+	-tests/install_libraries.sh
+
+test-clients: setup engines
 	$(BIN)/pytest tests/clients $(ARGS)
 
 bench: setup

@@ -1,12 +1,11 @@
 #!/usr/bin/env bash
 # Godot 4 for the tests of the addon, without touching the host: Debian sid with `godot` in a cached folder (1.1 GB).
 #   FOOTTRACK_GODOT_ROOT    the folder; default ${XDG_CACHE_HOME:-~/.cache}/foottrack/godot-sid
-#   FOOTTRACK_DEBIAN_MIRROR default http://deb.debian.org/debian
+#   FOOTTRACK_DEBIAN_MIRROR a Debian mirror; debootstrap's own default if unset
 # Needs Linux, root or sudo, and debootstrap, which is installed where apt-get is there. Does nothing the second time.
 set -euo pipefail
 
 root=${FOOTTRACK_GODOT_ROOT:-${XDG_CACHE_HOME:-$HOME/.cache}/foottrack/godot-sid}
-mirror=${FOOTTRACK_DEBIAN_MIRROR:-http://deb.debian.org/debian}
 if [ -x "$root/usr/bin/godot" ]; then
     echo "Godot is in $root"
     exit 0
@@ -21,7 +20,8 @@ unfinished=$(mktemp -d "$root.XXXXXX")
 trap 'as_root rm -rf "$unfinished"' EXIT
 chmod 755 "$unfinished"
 
-PATH=$PATH:/usr/sbin:/sbin as_root debootstrap --variant=minbase sid "$unfinished" "$mirror"
+PATH=$PATH:/usr/sbin:/sbin as_root debootstrap --variant=minbase sid "$unfinished" \
+    ${FOOTTRACK_DEBIAN_MIRROR:+"$FOOTTRACK_DEBIAN_MIRROR"}
 # A mirror that is a frozen snapshot is only taken with the settings by which the host takes it.
 if [ -d /etc/apt/apt.conf.d ]; then
     as_root cp -a /etc/apt/apt.conf.d/. "$unfinished/etc/apt/apt.conf.d/"
