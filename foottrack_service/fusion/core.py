@@ -141,11 +141,13 @@ class FusionCore:
             foot.settle(now)
 
     def _on_calibration(self, found: Any) -> None:
-        # Every calibration comes again every 5 s, and a filter that is placed anew has to find its foot again.
+        # Every calibration comes again every 5 s, and a filter that is placed anew has to find its foot again. Only one
+        # that began anew (foot.py) needs it again.
         kind = (found.kind, found.values.side if isinstance(found, ImuCalibration) else None)
-        if self._calibrated.get(kind) == found:
+        known = (found, sum(foot.health.rejected.get("not_finite", 0) for foot in self._feet.values()))
+        if self._calibrated.get(kind) == known:
             return
-        self._calibrated[kind] = found
+        self._calibrated[kind] = known
         if isinstance(found, FloorCalibration):
             for foot in self._feet.values():
                 foot.on_floor(found.values.height)
