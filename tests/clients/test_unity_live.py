@@ -12,6 +12,7 @@ from live_service import LiveService
 from unity_mono import UnityPackage
 
 from foottrack_client import Client, Publisher
+from foottrack_protocol import Message
 from foottrack_protocol.messages import BodyPose, HeadPose, IkFoot, IkTargets, Pose
 
 pytestmark = pytest.mark.engine
@@ -98,7 +99,7 @@ def test_head_poses_are_stamped_on_the_bus_clock_in_the_wire_s_axes(unity: Unity
         began = client.clock()
         with unity.play(service.endpoints) as run:
             run.until("frames", synchronised=True)
-            received = []
+            received: list[Message] = []
             while len([message for message in received if message.valid]) < 50:
                 message = heads.receive(20.0)
                 assert message is not None
@@ -136,7 +137,7 @@ def test_an_avatar_stands_where_its_user_stands(unity: UnityPackage, service: Li
         run.until("connected")
 
         def settled(said: dict[str, Any]) -> bool:
-            return said["left_weight"] == 1.0 and abs(said["hips"][1] - (0.85 + lift)) < 1e-3
+            return bool(said["left_weight"] == 1.0) and abs(said["hips"][1] - (0.85 + lift)) < 1e-3
 
         said = until_shown(run, publisher, "pose/body", body, settled)
         assert said["scale"] == pytest.approx(scale, rel=1e-3)
@@ -182,7 +183,7 @@ def test_an_avatar_walks_where_its_user_walks_in_place(unity: UnityPackage, serv
         assert walked["forward"] == pytest.approx([-1.0, 0.0, 0.0], abs=1e-6)
 
         def settled(said: dict[str, Any]) -> bool:
-            return said["left_weight"] == 1.0 and abs(said["hips"][1] - 0.95) < 1e-3
+            return bool(said["left_weight"] == 1.0) and abs(said["hips"][1] - 0.95) < 1e-3
 
         said = until_shown(run, publisher, "pose/ik", walk(0.0), settled)
     x = said["root"][0]

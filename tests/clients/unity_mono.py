@@ -58,6 +58,10 @@ class UnityPackage:
         """A game that talks while it runs."""
         return GodotRun(["mono", "--debug", str(self._program), "game", *ports_of(endpoints), follow])
 
+    def bench(self, endpoints: Endpoints, manner: str) -> GodotRun:
+        """A game that measures, and says nothing ("quiet") or its counters ("talk") until it ends."""
+        return GodotRun(["mono", str(self._program), "bench", *ports_of(endpoints), manner])
+
 
 def ports_of(endpoints: Endpoints) -> Sequence[str]:
     """Ingress, egress, control."""

@@ -13,7 +13,7 @@ namespace Foottrack.Tests
     /// </summary>
     internal sealed class Game
     {
-        private const long Final = 424242;
+        public const long Final = 424242;
         private const int FrameMs = 10;
         private const int FramesPerLine = 10;
 

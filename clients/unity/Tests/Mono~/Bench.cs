@@ -1,0 +1,121 @@
+using System;
+using System.Collections.Generic;
+using System.Threading;
+using UnityEngine;
+
+namespace Foottrack.Tests
+{
+    /// <summary>
+    /// A game at 60 frames a second that only measures: how late gait events are, decoded and on the main thread, and
+    /// what memory that takes. The event "stop" with the step <see cref="Game.Final"/> ends it.
+    /// </summary>
+    internal sealed class Bench
+    {
+        private const int FrameMs = 16;
+        private const int FramesPerLine = 15;
+        private const int MostMeasured = 1000000;
+
+        private readonly FoottrackClient _client;
+        private readonly bool _talks;
+        private readonly double[] _inThreadMs = new double[MostMeasured];
+        private readonly double[] _inUpdateMs = new double[MostMeasured];
+        private int _measured;
+        private int _collections;
+        private long _memory;
+        private double _longestFrameMs;
+        private bool _over;
+
+        private Bench(string[] arguments)
+        {
+            _client = new GameObject("foottrack").AddComponent<FoottrackClient>();
+            _client.ingressPort = int.Parse(arguments[1]);
+            _client.egressPort = int.Parse(arguments[2]);
+            _client.controlPort = int.Parse(arguments[3]);
+            _client.GaitEventReceived += OnGaitEvent;
+            _talks = arguments[4] == "talk";
+        }
+
+        /// <summary>Arguments: "bench", three ports, "talk" or "quiet": words take memory.</summary>
+        public static int Run(string[] arguments)
+        {
+            var bench = new Bench(arguments);
+            bench.Play();
+            return 0;
+        }
+
+        private void Play()
+        {
+            Scene.Begin(_client);
+            while (!(_client.Connection.IsLive && _client.Connection.IsSynchronised))
+            {
+                Thread.Sleep(FrameMs);
+            }
+            Say("connected");
+            for (int frame = 1; !_over; frame++)
+            {
+                long began = OwnClock.NowNs;
+                Scene.Frame(FrameMs * 1e-3f, _client);
+                _longestFrameMs = Math.Max(_longestFrameMs, (OwnClock.NowNs - began) * 1e-6);
+                if (_talks && frame % FramesPerLine == 0 && !_over)
+                {
+                    Say("frames");
+                }
+                Thread.Sleep(FrameMs);
+            }
+            _client.enabled = false;
+        }
+
+        private void OnGaitEvent(Received<GaitEvent> gait)
+        {
+            if (_measured == 0)
+            {
+                _memory = GC.GetTotalMemory(true);
+                _collections = GC.CollectionCount(0);
+            }
+            if (gait.Body.Step == Game.Final)
+            {
+                _over = true;
+                Finish();
+                return;
+            }
+            long now, arrival;
+            _client.Connection.TryGetBusTime(OwnClock.NowNs, out now);
+            _client.Connection.TryGetBusTime(gait.ArrivalNs, out arrival);
+            _inThreadMs[_measured] = (arrival - gait.Envelope.TPub) * 1e-6;
+            _inUpdateMs[_measured] = (now - gait.Envelope.TPub) * 1e-6;
+            _measured++;
+        }
+
+        private void Finish()
+        {
+            int collections = GC.CollectionCount(0) - _collections;
+            long memory = GC.GetTotalMemory(false) - _memory;
+            Program.Say(new Dictionary<string, object>
+            {
+                { "kind", "final" },
+                { "events", _measured },
+                { "collections", collections },
+                { "bytes", memory },
+                { "in_thread_ms", Copy(_inThreadMs) },
+                { "in_update_ms", Copy(_inUpdateMs) },
+                { "longest_frame_ms", _longestFrameMs },
+                { "statistics", _client.Connection.Statistics() },
+            });
+        }
+
+        private double[] Copy(double[] values)
+        {
+            var copy = new double[_measured];
+            Array.Copy(values, copy, _measured);
+            return copy;
+        }
+
+        private void Say(string kind)
+        {
+            Program.Say(new Dictionary<string, object>
+            {
+                { "kind", kind }, { "statistics", _client.Connection.Statistics() },
+            });
+        }
+    }
+}
