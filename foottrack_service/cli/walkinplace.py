@@ -26,7 +26,7 @@ from foottrack_service.config import Settings
 from foottrack_service.gait.trial import COUNTDOWN_S, DISTANCE_M, Trial
 from foottrack_service.recording.reader import open_recording
 
-_SILENCE_S = 5.0
+_SILENCE_S = 10.0
 _EVERY_M = 5.0
 
 
