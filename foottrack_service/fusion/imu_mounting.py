@@ -32,7 +32,14 @@ LARGEST_TURN = 0.45
 
 
 class MountingError(Exception):
-    """The movement does not show how the sensor sits; the text says what to do."""
+    """The movement does not show how the sensor sits; the text says what to do.
+
+    ``unfinished``: it may still, with what comes next.
+    """
+
+    def __init__(self, text: str, *, unfinished: bool = False) -> None:
+        super().__init__(text)
+        self.unfinished = unfinished
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,18 +58,20 @@ def find_mounting(samples: Sequence[ImuSample]) -> Mounting:
     """From samples of standing, one step forward and standing again. Raises MountingError."""
     t = np.array([s.t for s in samples]) * 1e-9
     if len(t) < 20 or t[-1] - t[0] < LEAST_STILL_S:
-        raise MountingError("too few samples: stand still for 3 s, take one step forward, and stand again")
+        raise MountingError(
+            "too few samples: stand still for 3 s, take one step forward, and stand again", unfinished=True
+        )
     acc, rate = np.array([s.acc for s in samples]), _rates(samples, t)
     still = _still(t, acc, rate)
     moving = np.flatnonzero(~still & (t > t[0] + LEAST_STILL_S))
     if not still[t < t[0] + LEAST_STILL_S].all():
         raise MountingError("the foot did not stand still at first: stand still for 3 s before the step")
     if moving.size == 0:
-        raise MountingError("the foot never moved: take one step forward")
+        raise MountingError("the foot never moved: take one step forward", unfinished=True)
     first = int(moving[0])
     after = np.flatnonzero(still & (np.arange(len(t)) > first) & (t > t[first] + 0.25))
     if after.size == 0:
-        raise MountingError("the foot did not come to rest: stand still after the step")
+        raise MountingError("the foot did not come to rest: stand still after the step", unfinished=True)
     last = int(after[0])
     standing = slice(0, max(1, first - 1))
     up = acc[standing].mean(axis=0)
