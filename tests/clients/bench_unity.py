@@ -16,7 +16,7 @@ from bench_godot import BURST, Peer, publish_at, quantiles, received, settle
 from client_traffic import FINAL, POSE, step
 from godot_project import GodotRun
 from live_service import LiveService
-from unity_mono import MISSING, UnityPackage, has_mono
+from unity_mono import MISSING, NURSERY_BYTES, UnityPackage, has_mono
 
 from foottrack_client import Client
 
@@ -46,7 +46,7 @@ def measured(unity: UnityPackage, hz: float, seconds: float) -> dict[str, Any]:
         "unity_main_thread_ms": quantiles(said["in_update_ms"]),
         "longest_frame_ms": round(said["longest_frame_ms"], 1),
         "collections": said["collections"],
-        "bytes_per_message": round(said["bytes"] / (hz * seconds), 2),
+        "garbage_bytes_per_message_below": round((said["collections"] + 1) * NURSERY_BYTES / (hz * seconds), 1),
         "pyzmq_ms": quantiles(peer.late_ms),
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 from collections.abc import Iterable, Sequence
@@ -15,6 +16,8 @@ from foottrack_client import Endpoints
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "clients/unity"
+NURSERY_BYTES = 64 * 1024
+"""Garbage that makes mono's collector run. Its usual 4 MiB would hide small objects."""
 MISSING = "no mono: run tests/clients/install_mono.sh (Debian: mono-mcs, mono-runtime)"
 
 
@@ -48,7 +51,12 @@ class UnityPackage:
     def run(self, *arguments: str) -> list[dict[str, Any]]:
         """Run a command to its end. Its lines."""
         done = subprocess.run(
-            ["mono", str(self._program), *arguments], capture_output=True, text=True, timeout=TIMEOUT_S, check=False
+            ["mono", str(self._program), *arguments],
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT_S,
+            check=False,
+            env={**os.environ, "MONO_GC_PARAMS": f"nursery-size={NURSERY_BYTES // 1024}k"},
         )
         assert done.returncode == 0, done.stderr
         lines = done.stdout.splitlines()
@@ -60,7 +68,8 @@ class UnityPackage:
 
     def bench(self, endpoints: Endpoints, manner: str) -> GodotRun:
         """A game that measures, and says nothing ("quiet") or its counters ("talk") until it ends."""
-        return GodotRun(["mono", str(self._program), "bench", *ports_of(endpoints), manner])
+        nursery = f"--gc-params=nursery-size={NURSERY_BYTES // 1024}k"
+        return GodotRun(["mono", nursery, str(self._program), "bench", *ports_of(endpoints), manner])
 
 
 def ports_of(endpoints: Endpoints) -> Sequence[str]:

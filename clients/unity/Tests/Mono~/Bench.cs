@@ -1,13 +1,12 @@
 using System;
 using System.Collections.Generic;
 using System.Threading;
-using UnityEngine;
 
 namespace Foottrack.Tests
 {
     /// <summary>
-    /// A game at 60 frames a second that only measures: how late gait events are, decoded and on the main thread, and
-    /// what memory that takes. The event "stop" with the step <see cref="Game.Final"/> ends it.
+    /// A loop at 60 frames a second that only measures: how late gait events are, decoded and on the main thread, and
+    /// how often garbage is collected meanwhile. The event "stop" with the step <see cref="Game.Final"/> ends it.
     /// </summary>
     internal sealed class Bench
     {
@@ -15,23 +14,23 @@ namespace Foottrack.Tests
         private const int FramesPerLine = 15;
         private const int MostMeasured = 1000000;
 
-        private readonly FoottrackClient _client;
+        private readonly FoottrackConnection _connection;
         private readonly bool _talks;
         private readonly double[] _inThreadMs = new double[MostMeasured];
         private readonly double[] _inUpdateMs = new double[MostMeasured];
         private int _measured;
         private int _collections;
-        private long _memory;
         private double _longestFrameMs;
         private bool _over;
 
         private Bench(string[] arguments)
         {
-            _client = new GameObject("foottrack").AddComponent<FoottrackClient>();
-            _client.ingressPort = int.Parse(arguments[1]);
-            _client.egressPort = int.Parse(arguments[2]);
-            _client.controlPort = int.Parse(arguments[3]);
-            _client.GaitEventReceived += OnGaitEvent;
+            _connection = new FoottrackConnection(new ConnectionSettings
+            {
+                IngressPort = int.Parse(arguments[1]),
+                EgressPort = int.Parse(arguments[2]),
+                ControlPort = int.Parse(arguments[3]),
+            });
             _talks = arguments[4] == "talk";
         }
 
@@ -45,8 +44,8 @@ namespace Foottrack.Tests
 
         private void Play()
         {
-            Scene.Begin(_client);
-            while (!(_client.Connection.IsLive && _client.Connection.IsSynchronised))
+            _connection.Start();
+            while (!(_connection.IsLive && _connection.IsSynchronised))
             {
                 Thread.Sleep(FrameMs);
             }
@@ -54,7 +53,11 @@ namespace Foottrack.Tests
             for (int frame = 1; !_over; frame++)
             {
                 long began = OwnClock.NowNs;
-                Scene.Frame(FrameMs * 1e-3f, _client);
+                Received<GaitEvent> gait;
+                while (!_over && _connection.TryTakeGaitEvent(out gait))
+                {
+                    OnGaitEvent(gait);
+                }
                 _longestFrameMs = Math.Max(_longestFrameMs, (OwnClock.NowNs - began) * 1e-6);
                 if (_talks && frame % FramesPerLine == 0 && !_over)
                 {
@@ -62,14 +65,13 @@ namespace Foottrack.Tests
                 }
                 Thread.Sleep(FrameMs);
             }
-            _client.enabled = false;
+            _connection.Dispose();
         }
 
         private void OnGaitEvent(Received<GaitEvent> gait)
         {
             if (_measured == 0)
             {
-                _memory = GC.GetTotalMemory(true);
                 _collections = GC.CollectionCount(0);
             }
             if (gait.Body.Step == Game.Final)
@@ -79,8 +81,8 @@ namespace Foottrack.Tests
                 return;
             }
             long now, arrival;
-            _client.Connection.TryGetBusTime(OwnClock.NowNs, out now);
-            _client.Connection.TryGetBusTime(gait.ArrivalNs, out arrival);
+            _connection.TryGetBusTime(OwnClock.NowNs, out now);
+            _connection.TryGetBusTime(gait.ArrivalNs, out arrival);
             _inThreadMs[_measured] = (arrival - gait.Envelope.TPub) * 1e-6;
             _inUpdateMs[_measured] = (now - gait.Envelope.TPub) * 1e-6;
             _measured++;
@@ -89,17 +91,15 @@ namespace Foottrack.Tests
         private void Finish()
         {
             int collections = GC.CollectionCount(0) - _collections;
-            long memory = GC.GetTotalMemory(false) - _memory;
             Program.Say(new Dictionary<string, object>
             {
                 { "kind", "final" },
                 { "events", _measured },
                 { "collections", collections },
-                { "bytes", memory },
                 { "in_thread_ms", Copy(_inThreadMs) },
                 { "in_update_ms", Copy(_inUpdateMs) },
                 { "longest_frame_ms", _longestFrameMs },
-                { "statistics", _client.Connection.Statistics() },
+                { "statistics", _connection.Statistics() },
             });
         }
 
@@ -114,7 +114,7 @@ namespace Foottrack.Tests
         {
             Program.Say(new Dictionary<string, object>
             {
-                { "kind", kind }, { "statistics", _client.Connection.Statistics() },
+                { "kind", kind }, { "statistics", _connection.Statistics() },
             });
         }
     }
