@@ -11,6 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from foottrack_service.bridges import node as bridges_node
 from foottrack_service.bus.broker import Broker
 from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.control import ControlServer
@@ -65,6 +66,7 @@ NODES: dict[str, Node] = {
     "imu": Node("imu", imu_node.run, wanted=lambda settings: not settings.imu.idle),
     "headset": Node("headset", headset_node.run, wanted=lambda settings: not settings.headset.idle),
     "camera": Node("camera", _camera, wanted=lambda settings: settings.camera.source.kind != "none"),
+    "bridges": Node("bridges", bridges_node.run, wanted=lambda settings: not settings.bridges.idle),
 }
 """Nodes by the name that ``foottrack node NAME`` takes."""
 

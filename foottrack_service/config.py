@@ -20,6 +20,7 @@ from pydantic_settings import BaseSettings, EnvSettingsSource, PydanticBaseSetti
 from foottrack_protocol.frames import TAG_ON_INSTEP
 from foottrack_protocol.messages import Float, Quat, Side, Vec3
 from foottrack_protocol.topics import DEFAULT_USER, is_user
+from foottrack_service.bridges.settings import BridgesSettings
 from foottrack_service.camera.settings import SourceSettings
 from foottrack_service.curve_settings import CurveSettings
 from foottrack_service.gait.settings import GaitSettings
@@ -209,6 +210,7 @@ class Settings(BaseSettings):
     gait: GaitSettings = GaitSettings()
     bus: BusSettings = BusSettings()
     recording: RecordingSettings = RecordingSettings()
+    bridges: BridgesSettings = BridgesSettings()
 
     @classmethod
     def settings_customise_sources(

@@ -51,7 +51,7 @@ def doctor(
     settings = settings_for(config, None, connect)
     findings = run_loop(_service(settings))
     if not probe:
-        findings = [*_imus(settings), *_camera(settings), *findings]
+        findings = [*_imus(settings), *_camera(settings), *_bridges(settings), *findings]
     sick = any(finding.level == "error" for finding in findings)
     if as_json:
         print_json({"healthy": not sick, "findings": [finding._asdict() for finding in findings]})
@@ -63,6 +63,16 @@ def doctor(
             if finding.advice:
                 console.print(f"         {escape(finding.advice)}", highlight=False)
     raise typer.Exit(int(sick))
+
+
+def _bridges(settings: Settings) -> list[Finding]:
+    from foottrack_service.bridges.conflicts import conflicts
+
+    found = [
+        Finding("ok", f"bridge {name}", f"bodies go to {target.host}, port {target.port}")
+        for name, target in settings.bridges.enabled.items()
+    ]
+    return found + [Finding("warning", "bridges", text, "Mend [bridges].") for text in conflicts(settings)]
 
 
 def _imus(settings: Settings) -> list[Finding]:
