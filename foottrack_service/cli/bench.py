@@ -33,6 +33,9 @@ def bench(
     faults: Annotated[
         bool, typer.Option("--faults", help="Instead: what is lost when parts fail (half a minute).")
     ] = False,
+    camera: Annotated[
+        bool, typer.Option("--camera", help="Instead: IMU bytes to pose with the camera on and off, in pairs.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Measure the service: IMU sample to pose, messages per second, idle CPU. Takes about half a minute.
@@ -45,6 +48,12 @@ def bench(
 
         with Console(stderr=True).status("breaking things ..."):
             print_json({"faults": run_loop(fault_runs())})
+        return
+    if camera:
+        from foottrack_service.cli.bench_camera import camera_pairs
+
+        with Console(stderr=True).status("drawing pictures") as status:
+            print_json({"camera": camera_pairs(seconds, status.update)})
         return
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()

@@ -34,12 +34,13 @@ from foottrack_service.evaluation.statistics import summary_mm
 from foottrack_service.evaluation.truth import TruthTrack
 
 if TYPE_CHECKING:
+    from foottrack_service.app import Service
     from foottrack_service.demo.hardware import Hardware
     from foottrack_service.simulation.scenario import Scenario
 
 _REDRAW_S = 0.25
-_LEAD_NS = 3_000_000_000
-"""From the service's start to the scenario's: the camera's process needs it to get going."""
+_LEADS_S = (3.0, 8.0, 20.0)
+"""From the service's start to the scenario's: the camera's process needs it to get going. Tried until all runs."""
 
 
 def demo(
@@ -71,9 +72,9 @@ def demo(
     pictures are searched. Example: foottrack demo --seconds 30 --task walk --record walk.mcap
     """
     settings = settings_for(config, None, listen)
-    scenario, hardware = _plugged_in(settings, task, seed, seconds, imu_hz, camera)
     watched = Watched()
     try:
+        scenario, hardware = _plugged_in(settings, task, seed, seconds, imu_hz, camera)
         with hardware:
             run_loop(_demo(scenario, hardware, record, watched, quiet=as_json))
     except KeyboardInterrupt:
@@ -140,6 +141,7 @@ class Watched:
 def _plugged_in(
     settings: Settings, task: str, seed: int, seconds: float, imu_hz: float, camera: str
 ) -> tuple[Scenario, Hardware]:
+    from foottrack_service.camera.frame import SourceError
     from foottrack_service.cli.sim import scenario_for
     from foottrack_service.demo.hardware import PICTURES, Hardware
     from foottrack_service.fusion.foot_filter import warm_up
@@ -150,49 +152,72 @@ def _plugged_in(
     warm_up()
     finds = {"camera": camera == "simulated"}
     scenario = scenario_for(task, seed, settings, seconds=seconds, imu_hz=imu_hz, **finds)
-    return scenario, Hardware(scenario, settings, imu_hz, camera)
+    try:
+        return scenario, Hardware(scenario, settings, imu_hz, camera)
+    except (SourceError, OSError) as error:
+        raise CommandFailed(str(error)) from None
 
 
 async def _demo(scenario: Scenario, hardware: Hardware, record: Path | None, watched: Watched, quiet: bool) -> None:
-    from foottrack_service.app import NODES, Service, recorder_node
+    from foottrack_service.app import Service, recorder_node
 
-    start = now() + _LEAD_NS
-    settings = hardware.found_by(start)
-    async with Service(settings) as service:
-        for node in NODES.values():
-            if node.wanted(settings):
-                service.start(node)
-        await service.running("fusion")
-        if record is not None:
-            service.start(recorder_node(record))
-            await service.running("recorder")
-        subscriber = service.bus.subscriber()
-        await subscriber.ready()
-        for name in hardware.nodes:
-            await service.running(name)
-        rates = StreamRates(subscriber)
-        play = asyncio.ensure_future(hardware.play(service.bus, start))
-        console = Console(stderr=True)
-        shown = Live(console=console, auto_refresh=False, transient=True) if not quiet and sys.stderr.isatty() else None
-        if not quiet:
-            console.print(f"{scenario.task}, {scenario.seconds:g} s, publishers on {service.endpoints.ingress} ...")
-            for note in hardware.notes:
-                console.print(note)
-        try:
-            if shown is not None:
-                shown.start()
-            await _watch(subscriber, play, rates, watched, shown, start, scenario.seconds)
-        finally:
-            if shown is not None:
-                shown.stop()
-            ended = now()
-            watched.seconds = max(0.001, (ended - start) * 1e-9)
-            watched.streams = {
-                topic: {"hz": round(row.messages / watched.seconds, 1), "gaps": row.gaps}
-                for topic, row in rates.rows(ended).items()
-            }
-            play.cancel()
-            await asyncio.gather(play, return_exceptions=True)
+    for lead_s in _LEADS_S:
+        start = now() + round(lead_s * 1e9)
+        async with Service(hardware.found_by(start)) as service:
+            if not await _all_running(service, hardware, start) and lead_s != _LEADS_S[-1]:
+                continue
+            if record is not None:
+                service.start(recorder_node(record))
+                await service.running("recorder")
+            await _play(service, scenario, hardware, start, watched, quiet)
+            return
+
+
+async def _all_running(service: Service, hardware: Hardware, start: int) -> bool:
+    """Start what the settings name, and say whether all of it ran in time: devices that send too early go unheard."""
+    from foottrack_service.app import NODES
+
+    for node in NODES.values():
+        if node.wanted(service.settings):
+            service.start(node)
+    await service.running("fusion")
+    try:
+        async with asyncio.timeout((start - now()) * 1e-9):
+            for name in hardware.nodes:
+                await service.running(name)
+    except TimeoutError:
+        return False
+    return True
+
+
+async def _play(
+    service: Service, scenario: Scenario, hardware: Hardware, start: int, watched: Watched, quiet: bool
+) -> None:
+    subscriber = service.bus.subscriber()
+    await subscriber.ready()
+    rates = StreamRates(subscriber)
+    play = asyncio.ensure_future(hardware.play(service.bus, start))
+    console = Console(stderr=True)
+    shown = Live(console=console, auto_refresh=False, transient=True) if not quiet and sys.stderr.isatty() else None
+    if not quiet:
+        console.print(f"{scenario.task}, {scenario.seconds:g} s, publishers on {service.endpoints.ingress} ...")
+        for note in hardware.notes:
+            console.print(note)
+    try:
+        if shown is not None:
+            shown.start()
+        await _watch(subscriber, play, rates, watched, shown, start, scenario.seconds)
+    finally:
+        if shown is not None:
+            shown.stop()
+        ended = now()
+        watched.seconds = max(0.001, (ended - start) * 1e-9)
+        watched.streams = {
+            topic: {"hz": round(row.messages / watched.seconds, 1), "gaps": row.gaps}
+            for topic, row in rates.rows(ended).items()
+        }
+        play.cancel()
+        await asyncio.gather(play, return_exceptions=True)
 
 
 async def _watch(

@@ -52,8 +52,9 @@ class Hardware:
 
     @property
     def nodes(self) -> list[str]:
-        """Names on the health board of what runs once the service has found everything but the camera."""
-        return [*(f"imu-{side}" for side in self._imus), "headset"]
+        """Names on the health board of what runs once a service has found everything."""
+        camera = ["camera"] if self._source.kind == "rendered" else []
+        return [*(f"imu-{side}" for side in self._imus), "headset", *camera]
 
     def found_by(self, start: int) -> Settings:
         """The settings with which a service finds it. ``start`` is when the scenario begins, bus clock, ns."""

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 from foottrack_service.config import Settings
 
-RATES_HZ = (60.0, 30.0, 15.0, 5.0)
+RATES_HZ = (60.0, 30.0, 15.0, 10.0)
+"""With fewer, no two finds are near enough to confirm each other."""
 _PICTURES = 10
 _SHARE = 0.8
 """Of a core, for the camera's process: fusion has the other one, or what is left of the only one."""

@@ -43,7 +43,9 @@ def running(cwd: Path, *args: str) -> Iterator[tuple[subprocess.Popen[str], str]
 @pytest.mark.slow
 def test_demo_reports_rates_errors_and_latency(tmp_path: Path) -> None:
     done = foottrack(
-        "demo", "--seconds", 4, "--listen", 0, "--task", "steps", "--record", "demo.mcap", "--json", cwd=tmp_path
+        *("demo", "--seconds", 4, "--listen", 0, "--task", "steps", "--record", "demo.mcap", "--json"),
+        *("--camera", "simulated"),
+        cwd=tmp_path,
     )
     found = json.loads(done.stdout)
     assert set(found) == {"seconds", "streams", "error_mm", "latency_ms"}
@@ -51,10 +53,23 @@ def test_demo_reports_rates_errors_and_latency(tmp_path: Path) -> None:
     assert set(found["error_mm"]["left"]) == {"mean", "median", "p95", "max"}
     assert 0.0 < found["error_mm"]["right"]["median"] < 60.0
     assert found["streams"]["user/pose/body"]["hz"] > 50.0
+    assert {"user/imu/left", "user/head/pose", "user/marker/left", "user/truth/right"} <= set(found["streams"])
     assert all(stream["gaps"] == 0 for stream in found["streams"].values())
     assert 0.0 < found["latency_ms"]["p50"] <= found["latency_ms"]["p99"]
     info = json.loads(foottrack("log", "info", "demo.mcap", "--json", cwd=tmp_path).stdout)
     assert "user/pose/body" in str(info["topics"])
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no ptys")
+def test_demo_finds_the_feet_in_drawn_pictures(tmp_path: Path) -> None:
+    done = foottrack("demo", "--seconds", 5, "--listen", 0, "--json", cwd=tmp_path, timeout=150.0)
+    found = json.loads(done.stdout)
+    drawn = min(found["streams"].get(f"user/marker/{side}", {"hz": 0.0})["hz"] for side in ("left", "right"))
+    if drawn < 9.0:
+        pytest.skip(f"this machine draws only {drawn:g} pictures/s beside its other work")
+    assert 0.0 < found["error_mm"]["left"]["median"] < 60.0
+    assert all(stream["gaps"] == 0 for stream in found["streams"].values())
 
 
 @pytest.mark.slow
@@ -89,7 +104,7 @@ def test_ctrl_c_closes_a_demo_s_recording(tmp_path: Path) -> None:
         cwd=tmp_path,
     )
     assert process.stderr is not None and process.stdout is not None
-    assert "walk-in-place" in process.stderr.readline()
+    assert any("publishers on" in line for line in process.stderr)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=20)
     assert process.returncode == 0, err
@@ -103,6 +118,8 @@ def test_ctrl_c_closes_a_demo_s_recording(tmp_path: Path) -> None:
     ("args", "code", "helps"),
     [
         (["demo", "--task", "flying"], 2, "walk-in-place"),
+        (["demo", "--camera", "eyes"], 2, "rendered"),
+        (["evaluate", "--camera", "eyes"], 2, "rendered"),
         (["node", "toaster"], 2, "fusion"),
         (["run", "--listen", "tcp://0.0.0.0:7701"], 1, "loopback"),
         (["run", "--listen", "nowhere"], 2, "tcp://127.0.0.1:7701"),
