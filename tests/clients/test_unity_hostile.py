@@ -113,10 +113,10 @@ def test_a_server_that_takes_nothing_does_not_hold_the_game(unity: UnityPackage,
         with pytest.raises(ConnectionError):
             while True:
                 peer.send(pings)
+        assert run.until("disconnected")["why"].endswith("takes nothing any more")
         again = fake.live_egress()
         again.send(message(*frames("gait/event", FINAL)))
-        said = run.until("final")
-    assert said["statistics"]["stalls"] == 1
+        run.until("final")
 
 
 def test_ping_is_answered_and_subscribe_of_zmtp_3_1_is_understood(unity: UnityPackage, fake: FakeService) -> None:
