@@ -29,6 +29,7 @@ from foottrack_service import rotations as rot
 from foottrack_service.body.skeleton import Skeleton
 from foottrack_service.body.solver import BodySolver, FootPlace, Legs
 from foottrack_service.config import Settings
+from foottrack_service.fusion.filters import MakeFilter, make_filter
 from foottrack_service.fusion.foot import Foot
 from foottrack_service.fusion.gait_link import GaitLink
 from foottrack_service.fusion.head_history import HeadHistory
@@ -48,7 +49,13 @@ class FusionCore:
     same results are returned.
     """
 
-    def __init__(self, settings: Settings, sid: str = "offline", sink: Callable[[Message], Any] | None = None) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        sid: str = "offline",
+        sink: Callable[[Message], Any] | None = None,
+        make: MakeFilter = make_filter,
+    ) -> None:
         self._sink = sink
         self._user = settings.user
         self._sid = sid
@@ -59,7 +66,7 @@ class FusionCore:
         self._calibrated: dict[tuple[str, Side | None], Any] = {}
         watched = settings.fusion.mount_calibration and settings.fusion.filter == "error-state"
         self._watch = MountWatch(settings.camera.mount_hash) if watched else None
-        self._feet: dict[Side, Foot] = {side: Foot(settings, side, self._heads, self._watch) for side in SIDES}
+        self._feet: dict[Side, Foot] = {side: Foot(settings, side, self._heads, self._watch, make) for side in SIDES}
         self._toes = {side: np.array(settings.feet.of(side).toe.p) for side in SIDES}
         self._shortest_ns = round(1e9 / settings.fusion.max_output_hz)
         self._silence_ns = round(settings.fusion.silence * 1e9)

@@ -11,7 +11,7 @@ import numpy as np
 from foottrack_protocol.messages import FilterHealth, Imu, ImuValues, MountValues, Optical, Side
 from foottrack_service import rotations as rot
 from foottrack_service.config import Placement, Settings
-from foottrack_service.fusion.filters import make_filter
+from foottrack_service.fusion.filters import MakeFilter, make_filter
 from foottrack_service.fusion.head_history import HeadHistory
 from foottrack_service.fusion.interface import FootEstimate, HeadSample, ImuSample, Kind, OpticalFix, Verdict
 from foottrack_service.fusion.mount_watch import MountWatch
@@ -40,9 +40,16 @@ class _Waiting:
 class Foot:
     """Takes a foot's messages, checks that they are plausible, and runs its filter."""
 
-    def __init__(self, settings: Settings, side: Side, heads: HeadHistory, watch: MountWatch | None = None) -> None:
-        self._settings, self._side, self._watch = settings, side, watch
-        self._filter = make_filter(settings, side)
+    def __init__(
+        self,
+        settings: Settings,
+        side: Side,
+        heads: HeadHistory,
+        watch: MountWatch | None = None,
+        make: MakeFilter = make_filter,
+    ) -> None:
+        self._settings, self._side, self._watch, self._make = settings, side, watch, make
+        self._filter = make(settings, side)
         self._heads = heads
         self._delay_ns = round(settings.timing.imu_delay * 1e9)
         self._acc_bias: Array | None = None
@@ -140,7 +147,7 @@ class Foot:
         if not math.isfinite(sum(found.p.tolist()) + sum(found.q.tolist()) + sum(found.v.tolist())):
             # A filter that lost its numbers starts again from the next measurement and never speaks them.
             self.reject("not_finite")
-            self._filter = make_filter(self._settings, self._side)
+            self._filter = self._make(self._settings, self._side)
             return None
         return found
 
