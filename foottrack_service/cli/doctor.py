@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.console import Console
@@ -11,6 +10,8 @@ from rich.markup import escape
 
 from foottrack_protocol import PROTOCOL_MAJOR
 from foottrack_protocol.frames import SIDES
+from foottrack_service.cli.doctor_clocks import clock, stamps
+from foottrack_service.cli.findings import Finding
 from foottrack_service.cli.running import ConfigOption, ConnectOption, JsonOption, print_json, run_loop, settings_for
 from foottrack_service.config import Settings
 
@@ -24,16 +25,6 @@ _MARKS = {
     "warning": "[yellow]warning[/]",
     "error": "[red]error[/]  ",
 }
-_LONGEST_EXPOSURE_S = 0.003
-
-
-class Finding(NamedTuple):
-    """One thing that was looked at."""
-
-    level: Literal["ok", "note", "warning", "error"]
-    subject: str
-    text: str
-    advice: str = ""
 
 
 def doctor(
@@ -42,6 +33,9 @@ def doctor(
     probe: Annotated[
         bool, typer.Option("--probe", help="Only whether the service answers: for health checks.")
     ] = False,
+    listen: Annotated[
+        bool, typer.Option("--listen", help="Open the serial ports and say which IMU talks there.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Look at ports, camera, headset, the service and its streams, and say what to do.
@@ -49,9 +43,12 @@ def doctor(
     Exit code 0 when nothing is wrong, 1 otherwise. Example: foottrack doctor
     """
     settings = settings_for(config, None, connect)
-    findings = run_loop(_service(settings))
+    findings = run_loop(_service(settings, brief=probe))
     if not probe:
-        findings = [*_imus(settings), *_camera(settings), *_bridges(settings), *findings]
+        from foottrack_service.cli import doctor_devices as devices
+
+        known = [*devices.imus(settings, listen), *devices.camera(settings), *devices.headset(settings)]
+        findings = [*known, *_bridges(settings), *findings]
     sick = any(finding.level == "error" for finding in findings)
     if as_json:
         print_json({"healthy": not sick, "findings": [finding._asdict() for finding in findings]})
@@ -75,58 +72,7 @@ def _bridges(settings: Settings) -> list[Finding]:
     return found + [Finding("warning", "bridges", text, "Mend [bridges].") for text in conflicts(settings)]
 
 
-def _imus(settings: Settings) -> list[Finding]:
-    from foottrack_service.imu import ports
-
-    there = ports.available()
-    named = ", ".join(port.device for port in there) or "none"
-    found = [Finding("ok" if there else "note", "serial ports", named)]
-    for side in SIDES:
-        device = getattr(settings.imu, side)
-        if device.format == "off":
-            found.append(
-                Finding(
-                    "note", f"imu {side}", "no device is configured", f"Name one under [imu.{side}], if there is one."
-                )
-            )
-        elif device.format == "slimevr":
-            found.append(
-                Finding("ok", f"imu {side}", f"a SlimeVR tracker, awaited on UDP port {settings.imu.slimevr_port}")
-            )
-        else:
-            try:
-                port = ports.find(device.port, there)
-            except ports.PortNotFound as error:
-                found.append(
-                    Finding("error", f"imu {side}", str(error), "Plug it in, or mend the port in the settings.")
-                )
-            else:
-                found.append(Finding("ok", f"imu {side}", f"{device.format} on {port}"))
-    return found
-
-
-def _camera(settings: Settings) -> list[Finding]:
-    source = settings.camera.source
-    if source.kind == "none":
-        return [Finding("note", "camera", "none is configured", "Choose one under [camera.source], if there is one.")]
-    found = [Finding("ok", "camera", f"{source.kind}, exposure {1e3 * source.exposure:g} ms")]
-    if source.exposure > _LONGEST_EXPOSURE_S:
-        found.append(Finding("warning", "exposure", "walking feet blur", "Set it to at most 0.003 s and add light."))
-    if source.kind == "realsense" and find_spec("pyrealsense2") is None:
-        found.append(
-            Finding("error", "camera", "pyrealsense2 is not installed", "Install it: pip install foottrack[realsense]")
-        )
-    sizes = sorted({tag.size for side in SIDES for tag in settings.camera.targets.of(side).tags})
-    printed = ", ".join(f"{1e3 * size:g}" for size in sizes)
-    found.append(
-        Finding(
-            "note", "tags", f"{settings.camera.dictionary}, {printed} mm", "Measure the print's ruler: scale matters."
-        )
-    )
-    return found
-
-
-async def _service(settings: Settings) -> list[Finding]:
+async def _service(settings: Settings, brief: bool) -> list[Finding]:
     from foottrack_service.bus.connection import Bus
     from foottrack_service.bus.errors import ControlError
 
@@ -140,6 +86,8 @@ async def _service(settings: Settings) -> list[Finding]:
         major = session["protocol"]["major"]
         if major != PROTOCOL_MAJOR:
             found.append(Finding("error", "protocol", f"it speaks {major}, we {PROTOCOL_MAJOR}", "Update the older."))
+        if not brief:
+            found += [await clock(client), *await stamps(bus, settings.user)]
         return found + await _streams(client, settings.user)
 
 
@@ -169,12 +117,14 @@ async def _streams(client: ControlClient, user: str) -> list[Finding]:
         found.append(
             Finding(
                 "note",
-                "headset",
-                "nobody publishes head/pose",
+                f"{user}/head/pose",
+                "nobody publishes it",
                 "Without it feet come without legs, and no camera helps.",
             )
         )
     for name, counts in health["filters"].items():
+        if name.rpartition("/")[2] not in SIDES:
+            continue
         total = sum(counts["accepted"].get(kind, 0) for kind in ("marker", "depth"))
         refused = sum(count for reason, count in counts["rejected"].items() if reason not in ("unused", "invalid"))
         if total + refused > 100 and refused > total:
