@@ -162,6 +162,8 @@ def _as_tables(results: dict[str, Any]) -> list[Table]:
     shown = []
     if results.get("tasks"):
         shown.append(_task_table("Error of the foot, mm; lag, ms (100 Hz, mild feet)", results["tasks"]))
+    if _filters(results.get("tasks", {})):
+        shown += [_fix_table(results["tasks"]), _centre_table(results["tasks"])]
     for label, rows in results.get("variants", {}).items():
         shown.append(_task_table(f"The same, {label}", rows))
     if "technical" in results:
@@ -192,6 +194,36 @@ def _task_table(title: str, rows: dict[str, Any]) -> Table:
                 end_section=index == len(row) - 1,
             )
     return table
+
+
+def _fix_table(rows: dict[str, Any]) -> Table:
+    table = Table(title="Optical fixes, per cent", title_justify="left")
+    for name in ("task", "filter"):
+        table.add_column(name, no_wrap=True)
+    for name in ("false ones rejected", "good ones lost"):
+        table.add_column(name, justify="right")
+    for task, name, values in _filters(rows):
+        table.add_row(task, name, _text(values["false_rejected"]), _text(values["good_lost"]))
+    return table
+
+
+def _centre_table(rows: dict[str, Any]) -> Table:
+    table = Table(title="Mean / p95 error by the tag's distance from the picture's centre, mm", title_justify="left")
+    for name in ("task", "filter"):
+        table.add_column(name, no_wrap=True)
+    for index, (task, name, values) in enumerate(_filters(rows)):
+        bins = values["by_centre_px"]
+        for label in bins if index == 0 else ():
+            table.add_column(f"{label} px", justify="right", no_wrap=True)
+        table.add_row(task, name, *(f"{_text(each['mean'])} / {_text(each['p95'])}" for each in bins.values()))
+    return table
+
+
+def _filters(rows: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
+    """Rows of the filters that were run, without bounds and publications."""
+    return [
+        (task, name, values) for task, row in rows.items() for name, values in row.items() if "by_centre_px" in values
+    ]
 
 
 def _technical_table(rows: dict[str, Any]) -> Table:

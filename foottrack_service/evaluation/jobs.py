@@ -15,8 +15,10 @@ from foottrack_protocol.messages import Side
 from foottrack_service import rotations as rot
 from foottrack_service.config import Settings
 from foottrack_service.evaluation import metrics
+from foottrack_service.evaluation.fixes import FixNotes, centre_px
 from foottrack_service.evaluation.published import Source
 from foottrack_service.evaluation.run import FootRun, Truth, run_filter
+from foottrack_service.evaluation.smoother import smoothed
 from foottrack_service.evaluation.truth import Flags
 from foottrack_service.rotations import Array
 from foottrack_service.simulation.faults import CameraBlackout
@@ -65,6 +67,10 @@ class FootResult:
     skates: list[float]
     gap_ends: list[float]
     peak_delay_s: float | None
+    tags: Array
+    """(n, 2): an accepted true tag's distance from the picture's centre, px, and the error at its instant."""
+    smoothed: Array
+    """Errors of the smoother (evaluation/smoother); empty where there is none."""
 
 
 @dataclass(slots=True)
@@ -75,6 +81,8 @@ class JobResult:
     feet: dict[Side, FootResult]
     accepted: dict[str, int] = field(default_factory=dict)
     rejected: dict[str, int] = field(default_factory=dict)
+    fixes: dict[str, int] = field(default_factory=dict)
+    """False and good fixes that reached the filter, and what it made of them (evaluation/fixes)."""
     times_real_time: float = 0.0
 
 
@@ -84,6 +92,7 @@ class ScenarioTruth:
     def __init__(self, scenario: Scenario, side: Side) -> None:
         self._start = scenario.start
         self._end_s = scenario.seconds
+        self.side = side
         self.track: FootTrack = scenario.truth.feet[side]
 
     def seconds(self, t: Array) -> Array:
@@ -118,16 +127,19 @@ def run_job(job: Job) -> JobResult:
 
         arrivals = list(_outside(with_pictures(scenario, job.feet), gap_windows(job)))
     began = time.perf_counter()
-    runs, core = run_filter(_left_on(arrivals, job.only), settings)
+    notes = FixNotes()
+    runs, core = run_filter(_left_on(arrivals, job.only), settings, notes.make)
     took = time.perf_counter() - began
     result = JobResult(job, {}, times_real_time=scenario.seconds / took)
+    if job.camera == "simulated":
+        result.fixes = notes.counts(scenario, WARM_UP_S)
     for health in core.health.values():
         for into, counts in ((result.accepted, health.accepted), (result.rejected, health.rejected)):
             for name, count in counts.items():
                 into[name] = into.get(name, 0) + count
     for side in SIDES:
         arm = np.array(settings.feet.of(side).marker.p) if job.filter == "reference" else np.zeros(3)
-        result.feet[side] = _figures(runs[side], ScenarioTruth(scenario, side), arm, job, scenario)
+        result.feet[side] = _figures(runs[side], ScenarioTruth(scenario, side), arm, job, scenario, notes)
     return result
 
 
@@ -165,7 +177,9 @@ def compare(run: FootRun, truth: Truth, arm: Array) -> tuple[Array, Array]:
     return run.point(arm), true + rot.rotate(truth.rotation(run.t), arm)
 
 
-def _figures(run: FootRun, truth: ScenarioTruth, arm: Array, job: Job, scenario: Scenario) -> FootResult:
+def _figures(
+    run: FootRun, truth: ScenarioTruth, arm: Array, job: Job, scenario: Scenario, notes: FixNotes
+) -> FootResult:
     first_s = WARM_UP_S if job.only is None else CUT_S
     run = run.cut(truth.covers(run.t) & ~np.isnan(run.age) & (truth.seconds(run.t) >= first_s))
     estimate, true = compare(run, truth, arm)
@@ -189,7 +203,33 @@ def _figures(run: FootRun, truth: ScenarioTruth, arm: Array, job: Job, scenario:
         skates=metrics.skate_m(estimate - true, planted) if len(planted) else [],
         gap_ends=_gap_ends(seconds, errors, gap_windows(job)),
         peak_delay_s=_peak_delay(seconds, errors, truth) if job.task == "sudden-move" else None,
+        tags=_tags(seconds, errors, scenario, notes, truth.side),
+        smoothed=_smoothed(scenario, notes, truth) if _has_smoother(job) else np.empty(0, dtype=np.float32),
     )
+
+
+def _has_smoother(job: Job) -> bool:
+    return job.filter == "ours" and job.camera == "simulated" and job.only is None and job.gaps_s is None
+
+
+def _tags(seconds: Array, errors: Array, scenario: Scenario, notes: FixNotes, side: Side) -> Array:
+    fixes = notes.good_tags(scenario, side)
+    if not fixes or len(seconds) == 0:
+        return np.empty((0, 2))
+    t = (np.array([fix.t for fix in fixes]) - scenario.start) * 1e-9
+    rows = np.stack([centre_px(fixes, scenario.settings), np.interp(t, seconds, errors)], axis=1)
+    return np.asarray(rows[t >= seconds[0]])
+
+
+def _smoothed(scenario: Scenario, notes: FixNotes, truth: ScenarioTruth) -> Array:
+    samples = [m for _, m in scenario.messages() if m.stream == f"imu/{truth.side}" and m.valid]
+    t = truth.seconds(np.array([m.t for m in samples], dtype=np.int64)) - scenario.settings.timing.imu_delay
+    acc = np.array([m.data.acc for m in samples]).reshape(-1, 3)
+    fixes, foot = notes.good_tags(scenario, truth.side), scenario.settings.feet.of(truth.side)
+    times, ankle = smoothed(t, acc, fixes, scenario.start, truth.track, foot)
+    late = times >= WARM_UP_S
+    errors = np.linalg.norm(ankle - truth.track.pose(times)[0], axis=1)
+    return np.asarray(errors[late].astype(np.float32))
 
 
 def _gap_ends(seconds: Array, errors: Array, windows: Sequence[tuple[float, float]]) -> list[float]:

@@ -15,6 +15,7 @@ from foottrack_service import rotations as rot
 from foottrack_service.config import Settings
 from foottrack_service.evaluation.truth import Flags, TruthTrack
 from foottrack_service.fusion.core import FusionCore
+from foottrack_service.fusion.filters import MakeFilter, make_filter
 from foottrack_service.fusion.offline import fuse
 from foottrack_service.rotations import Array
 
@@ -64,9 +65,11 @@ class FootRun:
         return self.p + rot.rotate(self.q, arm)
 
 
-def run_filter(arrivals: Iterable[tuple[int, Message]], settings: Settings) -> tuple[dict[Side, FootRun], FusionCore]:
+def run_filter(
+    arrivals: Iterable[tuple[int, Message]], settings: Settings, make: MakeFilter = make_filter
+) -> tuple[dict[Side, FootRun], FusionCore]:
     """Fuse messages in order of arrival (ns) and collect both feet."""
-    core = FusionCore(settings)
+    core = FusionCore(settings, make=make)
     return collect(fuse(arrivals, core)), core
 
 

@@ -1,8 +1,8 @@
 """The parts of the report: which runs each needs, and what it makes of them.
 
-``tasks``: every task, both feet with IMU. ``technical``: [B]'s bench by the source that is left on. ``study``: [B]'s
-six tasks with the left foot without IMU. ``variants``: 400 Hz, hard feet, raw axes. ``gaps``: the camera goes dark in a
-walk.
+``tasks``: every task, both feet with IMU, and a smoother as the lower bound. ``technical``: [B]'s bench by the source
+that is left on. ``study``: [B]'s six tasks with the left foot without IMU. ``variants``: 400 Hz, hard feet, raw axes.
+``gaps``: the camera goes dark in a walk.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
+from itertools import pairwise
 from multiprocessing import get_context
 from typing import Any, Literal
 
@@ -18,6 +19,7 @@ import numpy as np
 
 from foottrack_protocol.frames import SIDES
 from foottrack_protocol.messages import Side
+from foottrack_service.evaluation.fixes import CENTRE_BINS_PX
 from foottrack_service.evaluation.jobs import FILTERS, Job, JobResult, run_job
 from foottrack_service.evaluation.metrics import within_sigma
 from foottrack_service.evaluation.published import (
@@ -118,6 +120,25 @@ def figures(results: Sequence[JobResult], sides: Sequence[Side] = SIDES) -> dict
         "skate": _rounded(1e3 * float(np.mean(skates))) if skates else None,
         "within_sigma": within_sigma(_joined(foot.in_sigma for foot in feet), np.ones(1)),
         "rejected": _added(result.rejected for result in results),
+        **_fix_shares(_added(result.fixes for result in results)),
+        "by_centre_px": _by_centre(np.concatenate([np.empty((0, 2)), *(foot.tags for foot in feet)])),
+    }
+
+
+def _fix_shares(counts: dict[str, int]) -> dict[str, float | None]:
+    """Per cent of false fixes that were rejected, and of good ones that were lost; nil where there were none."""
+
+    def share(part: str, of: str) -> float | None:
+        return _rounded(100.0 * counts[part] / counts[of]) if counts.get(of) else None
+
+    return {"false_rejected": share("false_rejected", "false"), "good_lost": share("good_lost", "good")}
+
+
+def _by_centre(tags: Any) -> dict[str, dict[str, float | None]]:
+    """Errors by the tag's distance from the picture's centre."""
+    return {
+        f"{low}-{high}": summary_mm(tags[(tags[:, 0] >= low) & (tags[:, 0] < high), 1])
+        for low, high in pairwise(CENTRE_BINS_PX)
     }
 
 
@@ -129,6 +150,9 @@ def _row(task: str, found: Sequence[JobResult]) -> dict[str, Any]:
     row: dict[str, Any] = {
         name: figures([result for result in found if result.job.filter == name]) for name in ("reference", "ours")
     }
+    bound = _joined(foot.smoothed for result in found for foot in result.feet.values())
+    if len(bound):
+        row["smoother"] = {**summary_mm(bound), "lag": None}
     row["published"] = _published(task)
     return row
 

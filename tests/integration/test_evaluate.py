@@ -49,7 +49,7 @@ def test_sections_name_their_runs_and_pool_them() -> None:
     short = run_job(Job("still", 5, "ours", seconds=3.0))
     table = tables("tasks", dict.fromkeys(wanted, short), ["still"], seeds)
     assert set(table) == {"still"}
-    assert set(table["still"]) == {"reference", "ours", "published"}
+    assert set(table["still"]) == {"reference", "ours", "smoother", "published"}
     assert {"mean", "median", "p95", "max", "lag"} <= set(table["still"]["ours"])
     assert table["still"]["published"]["mean"] == 2.96
 
