@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from foottrack_service.cli.running import CommandFailed, ConfigOption, ConnectOption, UserOption, run_loop, settings_for
 from foottrack_service.calibration.store import Store
+from foottrack_service.cli.running import CommandFailed, ConfigOption, ConnectOption, UserOption, run_loop, settings_for
 from foottrack_service.config import Settings
 
 
@@ -71,9 +71,19 @@ async def _serve(settings: Settings) -> None:
 async def _one_node(name: str, settings: Settings) -> None:
     from foottrack_service.app import NODES
     from foottrack_service.bus.connection import Bus
+    from foottrack_service.bus.timesync import SyncedClock, clock_of, synchronise
 
     with Bus.connect(settings.bus) as bus:
-        probe = bus.subscriber(["sys/session"])
-        await probe.ready()
+        await bus.subscriber(["sys/session"]).ready()
+        clock = await clock_of(bus.control())
+    remote = clock if isinstance(clock, SyncedClock) else None
+    if remote is not None and (name == "camera" or (name == "headset" and settings.headset.source == "openxr")):
+        raise CommandFailed(f"the {name}'s stamps are of its own host's clock: run it on the service's host")
+    with Bus.connect(settings.bus, clock=clock) as bus:
         typer.echo(f"{name} runs on {settings.bus.ingress}. Ctrl-C ends it.", err=True)
-        await asyncio.shield(asyncio.ensure_future(NODES[name].run(bus, settings)))
+        keeping = None if remote is None else asyncio.ensure_future(synchronise(remote, bus.control()))
+        try:
+            await asyncio.shield(asyncio.ensure_future(NODES[name].run(bus, settings)))
+        finally:
+            if keeping is not None:
+                keeping.cancel()
