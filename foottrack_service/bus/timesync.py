@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from foottrack_service.bus.clock import BusClock, now
 from foottrack_service.bus.control_client import ControlClient
-from foottrack_service.bus.errors import ControlError
+from foottrack_service.bus.errors import ControlError, ControlTimeout
 
 BURST = 8
 """Requests in a burst, as in liblsl."""
@@ -106,19 +106,33 @@ async def measure(ask: Ask, clock: BusClock = now, requests: int = BURST) -> lis
     return exchanges
 
 
+async def clock_of(client: ControlClient) -> BusClock:
+    """``now`` on the service's own host, else a ``SyncedClock`` that is fresh and wants ``synchronise``.
+
+    Raises ControlError when the service does not answer.
+    """
+    clock = SyncedClock()
+    await _ask_time(client)
+    clock.on_burst(await measure(lambda: _ask_time(client), clock.own))
+    if clock.offset is None or clock.uncertainty is None:
+        raise ControlTimeout("the service answers too slowly to tell its clock")
+    # Two hosts whose clocks agree so well have been started in the same millisecond.
+    return now if abs(clock.offset) <= clock.uncertainty else clock
+
+
 async def synchronise(clock: SyncedClock, client: ControlClient, period_s: float = 2.0) -> None:
     """Measure bursts until cancelled; a service that does not answer only lets the clock go stale."""
-
-    async def ask() -> int:
-        answer = await client.request("time", timeout_s=0.5)
-        t = answer.get("t") if isinstance(answer, dict) else None
-        if not isinstance(t, int):
-            raise ControlError("bad_answer", "the answer to 'time' has no time")
-        return t
-
     while True:
-        clock.on_burst(await measure(ask, clock.own))
+        clock.on_burst(await measure(lambda: _ask_time(client), clock.own))
         await asyncio.sleep(period_s)
+
+
+async def _ask_time(client: ControlClient) -> int:
+    answer = await client.request("time", timeout_s=0.5)
+    t = answer.get("t") if isinstance(answer, dict) else None
+    if not isinstance(t, int):
+        raise ControlError("bad_answer", "the answer to 'time' has no time")
+    return t
 
 
 def _knows_better(found: _Offset, best: _Offset) -> bool:

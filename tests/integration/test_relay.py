@@ -32,6 +32,7 @@ from foottrack_service.bus import (
 )
 from foottrack_service.bus.endpoints import Context
 from foottrack_service.bus.security import load_keys, new_keys
+from foottrack_service.bus.timesync import SyncedClock, clock_of
 from foottrack_service.cli.main import app
 from foottrack_service.cli.running import CommandFailed
 from foottrack_service.config import BusSettings, ConfigError, load
@@ -125,6 +126,31 @@ def test_requests_pass_and_time_is_the_services(run: Run, keyring: Keyring, cont
                     unsure = relay.clock.uncertainty
                     assert unsure is not None
                     assert before - unsure <= told <= after + unsure
+
+    run(scenario())
+
+
+def test_a_party_knows_whether_the_services_clock_is_its_own(run: Run, keyring: Keyring, context: Context) -> None:
+    async def scenario() -> None:
+        with Broker(keyring.settings, context) as broker:
+            async with control(broker), relaying(keyring.client(broker, "engine")) as relay:
+                with Bus.connect(relay.endpoints, context) as behind:
+                    client = behind.control()
+                    while not relay.clock.fresh():
+                        with suppress(ControlError):
+                            await client.request("time")
+                    clock = await clock_of(client)
+                    assert isinstance(clock, SyncedClock)
+                    assert clock.fresh()
+                    unsure = (relay.clock.uncertainty or 0) + (clock.uncertainty or 0)
+                    before, told, after = service_clock(), clock(), service_clock()
+                    assert before - unsure <= told <= after + unsure
+        server = ControlServer(context, "tcp://127.0.0.1:0", {})
+        serving = asyncio.ensure_future(server.run())
+        with Bus.connect(BusSettings(control=server.endpoint), context) as beside:
+            assert await clock_of(beside.control()) is now
+        server.close()
+        await serving
 
     run(scenario())
 
