@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from foottrack_service.cli import calibrate_imu, calibrate_mounting, calibrate_person, camera
+from foottrack_service.cli import calibrate_headset, calibrate_imu, calibrate_mounting, calibrate_person, camera
 
 app = typer.Typer(no_args_is_help=True, help="Measure what the settings cannot know.")
 app.command("floor")(calibrate_person.floor)
@@ -13,5 +13,6 @@ app.command("body")(calibrate_person.body)
 app.command("mount")(calibrate_person.mount)
 app.command("imu")(calibrate_imu.imu)
 app.command("mounting")(calibrate_mounting.mounting)
+app.command("headset")(calibrate_headset.headset)
 app.command("camera")(camera.calibrate_camera)
 app.command("floor-by-depth")(camera.calibrate_floor)
