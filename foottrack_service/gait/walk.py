@@ -21,18 +21,24 @@ from foottrack_service.gait.steps import Feet, Steps
 
 FIRST_PEAK = 0.12
 """m: the peak that is expected before the first."""
-LONGEST_STEP = 0.55
+LONGEST_STEP = 0.5
 """Of the leg: how far from the hips a step may end."""
-FARTHEST = 0.72
-"""Of the leg: how far back a planted foot may go; the avatar slows down before."""
-_SLOWING = 0.12
-"""Of the leg: over this way."""
+LEAVES, FARTHEST = 0.52, 0.62
+"""Of the leg: who walks fast runs. The avatar's planted foot leaves the floor from the first on, though the user's
+still stands, and goes back no further than the second."""
+_RUNNING_LIFT = 0.05
+"""m: how high such a foot is held until the user's follows."""
+_RUNNING_S = 0.03
+"""s: how fast it gets there."""
+_RUNNING_SPEED = 0.3
+"""m/s: a slower avatar does not run."""
 _DOWN, _UP = 0.004, 0.03
 """m: a foot below the first stands, above the second it flies free; in between it goes along with the ground."""
+_LANDING_S = 0.05
 _SPEED_S = 0.15
 """s: how fast the avatar's speed follows the model's."""
-_GAINS = 12.0
-"""m/s^2: and at most so; a foot that was out of reach and leaves would set it free at once."""
+_LAST_BRAKE = 0.4
+"""m/s^2, below 0.02 m/s: an exponential never ends."""
 _RETURN_AFTER_S = 1.5
 """s of standing after which the legs come back under the hips [Z]."""
 _RETURN_S = 0.4
@@ -114,14 +120,19 @@ class _Leg:
         self.pitch += turn
         return LegTarget(self.z, max(0.0, height + self.extra), self.pitch)
 
-    def along(self, foot: FootPhases, way: float, dt: float) -> None:
-        """Go after the swing's goal, and along with the ground, which moves back by ``way`` m."""
+    def along(self, foot: FootPhases, speed: float, dt: float, leg: float) -> None:
+        """Go after the swing's goal, and along with the ground, which moves back at ``speed`` m/s."""
+        way = speed * dt
         if foot.phase == "stance":
-            wanted = 1.0
+            runs = _smooth((-self.z / leg - LEAVES) / (FARTHEST - LEAVES)) * min(1.0, speed / _RUNNING_SPEED)
+            if _RUNNING_LIFT * runs > self.extra:
+                self.extra += (_RUNNING_LIFT * runs - self.extra) * (1.0 - math.exp(-dt / _RUNNING_S))
+            wanted = 1.0 - runs
         else:
             clear = foot.lift if foot.phase == "ascending" else foot.height
-            share = min(max((clear - _DOWN) / (_UP - _DOWN), 0.0), 1.0)
-            wanted = 1.0 - share * share * (3.0 - 2.0 * share)
+            # A fast landing is met earlier, or the foot would stop within a frame.
+            free = max(_UP, -_LANDING_S * foot.vy)
+            wanted = 1.0 - _smooth((clear - _DOWN) / (free - _DOWN))
         change = dt / 0.03
         self.down += min(max(wanted - self.down, -change), change)
         if foot.height + self.extra < _DOWN:
@@ -144,7 +155,7 @@ class WalkingLegs:
     def __init__(self, leg: float) -> None:
         self._leg = leg
         self._legs = (_Leg(), _Leg())
-        self._speed = self._shown = 0.0
+        self._speed = 0.0
         self._returning: int | None = None
         self._returned_s = 0.0
 
@@ -153,9 +164,8 @@ class WalkingLegs:
         wanted = steps.speed(t)
         self._speed += (wanted - self._speed) * (1.0 - math.exp(-dt / _SPEED_S))
         if wanted == 0.0 and self._speed < 0.02:
-            self._speed = max(0.0, self._speed - 0.1 * dt)
-        speed = min(self._speed * self._room(feet), self._shown + _GAINS * dt)
-        self._shown = speed
+            self._speed = max(0.0, self._speed - _LAST_BRAKE * dt)
+        speed = self._speed
         for index, (leg, foot) in enumerate(zip(self._legs, feet, strict=True)):
             if foot.phase != "stance":
                 if self._returning == index:
@@ -163,9 +173,9 @@ class WalkingLegs:
                 leg.swing(foot, self._plan(foot, steps, wanted, index))
             else:
                 leg.swinging = False
-            leg.along(foot, speed * dt, dt)
             if self._returning != index:
                 leg.extra *= math.exp(-dt / _SETTLE_S)
+            leg.along(foot, speed, dt, self._leg)
         self._return(t, dt, feet, steps)
         left, right = (leg.show(foot, dt) for leg, foot in zip(self._legs, feet, strict=True))
         drop = pelvis_drop(self._leg, left.z, right.z)
@@ -177,11 +187,6 @@ class WalkingLegs:
         swing = foot.swing_s or 0.8 * steps.step_s
         stance = max(2.0 * steps.step_s - swing, 0.3 * steps.step_s)
         return min(0.5 * speed * stance, LONGEST_STEP * self._leg)
-
-    def _room(self, feet: Feet) -> float:
-        """Share of the speed that the planted feet allow: nobody stands on a foot that is out of reach."""
-        back = max((-leg.z for leg, foot in zip(self._legs, feet, strict=True) if foot.phase == "stance"), default=0.0)
-        return min(max((FARTHEST * self._leg - back) / (_SLOWING * self._leg), 0.0), 1.0)
 
     def _return(self, t: int, dt: float, feet: Feet, steps: Steps) -> None:
         if steps.walking or self._speed > 0.0 or not (feet.left.standing and feet.right.standing):
@@ -205,6 +210,11 @@ class WalkingLegs:
         leg.extra = lift * math.sin(math.pi * share) ** 2
         if share >= 1.0:
             self._returning = None
+
+
+def _smooth(share: float) -> float:
+    s = min(max(share, 0.0), 1.0)
+    return s * s * (3.0 - 2.0 * s)
 
 
 def _carried(share: float) -> float:
