@@ -22,6 +22,7 @@ from foottrack_service.bus import (
     BindRefused,
     Broker,
     Bus,
+    ControlClient,
     ControlError,
     ControlServer,
     KeyFileError,
@@ -93,6 +94,17 @@ async def both_found(publisher: Publisher, subscriber: Subscriber, times: int) -
         subscriber.drain()
 
 
+async def clock_found(relay: Relay, client: ControlClient) -> None:
+    """Wait until requests and answers pass, and the relay has the service's clock."""
+    while not relay.clock.fresh():
+        with suppress(ControlError):
+            await client.request("hello")
+    while True:
+        with suppress(ControlError):
+            await client.request("hello")
+            return
+
+
 def test_messages_pass_unchanged_in_both_directions(run: Run, keyring: Keyring, context: Context) -> None:
     async def scenario() -> None:
         with Broker(keyring.settings, context) as broker:
@@ -114,12 +126,10 @@ def test_requests_pass_and_time_is_the_services(run: Run, keyring: Keyring, cont
             async with control(broker), relaying(keyring.client(broker, "engine")) as relay:
                 with Bus.connect(relay.endpoints, context) as behind:
                     client = behind.control()
+                    await clock_found(relay, client)
                     assert await client.request("add", {"a": 1}) == 2
                     with pytest.raises(ControlError, match="unknown_command"):
                         await client.request("dance")
-                    while not relay.clock.fresh():
-                        with suppress(ControlError):
-                            await client.request("time")
                     before = service_clock()
                     told = (await client.request("time"))["t"]
                     after = service_clock()
@@ -136,9 +146,7 @@ def test_a_party_knows_whether_the_services_clock_is_its_own(run: Run, keyring: 
             async with control(broker), relaying(keyring.client(broker, "engine")) as relay:
                 with Bus.connect(relay.endpoints, context) as behind:
                     client = behind.control()
-                    while not relay.clock.fresh():
-                        with suppress(ControlError):
-                            await client.request("time")
+                    await clock_found(relay, client)
                     clock = await clock_of(client)
                     assert isinstance(clock, SyncedClock)
                     assert clock.fresh()
