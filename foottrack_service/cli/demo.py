@@ -83,7 +83,7 @@ def demo(
     if as_json:
         print_json(results)
     else:
-        _show(results, record)
+        _show(results, settings.user, record)
 
 
 class Watched:
@@ -254,7 +254,7 @@ async def _watch(
     play.result()
 
 
-def _show(results: dict[str, Any], record: Path | None) -> None:
+def _show(results: dict[str, Any], user: str, record: Path | None) -> None:
     console = Console()
     table = Table(title=f"Error of the ankle against the truth, mm ({results['seconds']:.0f} s)", title_justify="left")
     table.add_column("foot")
@@ -263,6 +263,13 @@ def _show(results: dict[str, Any], record: Path | None) -> None:
     for side, errors in results["error_mm"].items():
         table.add_row(side, *("-" if value is None else f"{value:.1f}" for value in errors.values()))
     console.print(table)
+    for side, errors in results["error_mm"].items():
+        if errors["mean"] is None:
+            seen = results["streams"].get(f"{user}/marker/{side}", {"hz": 0.0})["hz"]
+            console.print(
+                f"The {side} foot was seen {seen:g} times a second, which is not enough to know where it is. On a busy "
+                "machine: --camera simulated."
+            )
     latency = results["latency_ms"]
     if latency["p50"] is not None:
         console.print(f"IMU sample published -> pose at a subscriber: {latency['p50']} ms p50, {latency['p99']} ms p99")
