@@ -84,6 +84,7 @@ async def _receive(bus: Bus, settings: Settings) -> None:
     try:
         socket = await DatagramSocket.open(vmc.host, vmc.port, on_datagram, bus.clock)
     except OSError as error:
+        head.publisher.close()
         raise OSError(f"UDP {vmc.host}:{vmc.port} for VMC: {error.strerror or error}") from None
     _log.info("headset: VMC is awaited on UDP %s:%d", vmc.host, socket.port)
     bus.health.node(SOURCE, "running")
@@ -96,6 +97,7 @@ async def _receive(bus: Bus, settings: Settings) -> None:
     finally:
         reporting.cancel()
         socket.close()
+        head.publisher.close()
 
 
 async def _ask_openvr(bus: Bus, settings: Settings, head: _Head | None) -> None:
@@ -121,30 +123,39 @@ async def _ask(bus: Bus, settings: Settings, open_: Callable[[], PolledSource], 
     """
     loop = asyncio.get_running_loop()
     truth = bus.publisher("truth")
-    publishers = [truth] if head is None else [truth, head.publisher]
-    for publisher in publishers:
-        await publisher.ready()
-    reporting = None if head is None else asyncio.ensure_future(head.report())
-    with ThreadPoolExecutor(1, thread_name_prefix="headset") as thread:
-        source = await loop.run_in_executor(thread, open_)
-        bus.health.node("truth" if head is None else SOURCE, "running")
-        try:
-            due = loop.time()
-            while True:
-                polled = await loop.run_in_executor(thread, source.poll)
-                if polled is not None:
-                    if head is not None:
-                        head.take(polled)
-                    for side, ankle in polled.truth.items():
-                        body = Truth(p=tuple(ankle.p.tolist()), q=tuple(ankle.q.tolist()))
-                        truth.publish(settings.user, f"truth/{side}", polled.t, body)
-                due = max(due + _period_s(settings.headset), loop.time())
-                await asyncio.sleep(due - loop.time())
-        finally:
-            if reporting is not None:
-                reporting.cancel()
-            thread.submit(source.close)
-            truth.close()
+    await truth.ready()
+    if head is not None:
+        await head.publisher.ready()
+    reporting = asyncio.ensure_future(asyncio.sleep(0.0) if head is None else head.report())
+    try:
+        with ThreadPoolExecutor(1, thread_name_prefix="headset") as thread:
+            source = await loop.run_in_executor(thread, open_)
+            bus.health.node("truth" if head is None else SOURCE, "running")
+            try:
+                due = loop.time()
+                while True:
+                    _publish(await loop.run_in_executor(thread, source.poll), bus, settings.user, head, truth)
+                    due = max(due + _period_s(settings.headset), loop.time())
+                    await asyncio.sleep(due - loop.time())
+            finally:
+                thread.submit(source.close)
+    finally:
+        reporting.cancel()
+        truth.close()
+        if head is not None:
+            head.publisher.close()
+
+
+def _publish(polled: Polled | None, bus: Bus, user: str, head: _Head | None, truth: Publisher) -> None:
+    if polled is None:
+        if head is not None and head.stream.silent(bus.clock()):
+            head.publish(head.stream.lost(bus.clock()))
+        return
+    if head is not None:
+        head.take(polled)
+    for side, ankle in polled.truth.items():
+        body = Truth(p=tuple(ankle.p.tolist()), q=tuple(ankle.q.tolist()))
+        truth.publish(user, f"truth/{side}", polled.t, body)
 
 
 def _period_s(headset: HeadsetSettings) -> float:
