@@ -42,6 +42,9 @@ def evaluate(
     real: Annotated[
         Path | None, typer.Option("--real", help="Instead: real recordings of foot-worn IMUs in this folder.")
     ] = None,
+    gait: Annotated[
+        bool, typer.Option("--gait", help="Instead: walking in place; with --real also recordings of real steps.")
+    ] = False,
     plot: Annotated[Path | None, typer.Option("--plot", help="Draw error over time into this folder (PNG).")] = None,
     html: Annotated[Path | None, typer.Option("--html", help="Write one page with tables and pictures.")] = None,
     as_json: JsonOption = False,
@@ -54,6 +57,15 @@ def evaluate(
     if camera not in ("simulated", "rendered"):
         raise CommandFailed(f"--camera is simulated or rendered, not {camera!r}", EXIT_USAGE)
     sections = sections or ("tasks" if camera == "rendered" else ",".join(DEFAULT_SECTIONS))
+    if gait:
+        from foottrack_service.cli.evaluate_gait import evaluate_gait, show_gait
+
+        found = evaluate_gait(_chosen_seeds(seeds), real, quiet=as_json)
+        if as_json:
+            print_json(found)
+        else:
+            show_gait(found)
+        return
     if real is not None:
         from foottrack_service.evaluation.real import real_tables
 

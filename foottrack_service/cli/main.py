@@ -26,6 +26,7 @@ from foottrack_service.cli import (
     settings,
     sim,
     walk,
+    walkinplace,
     watch,
 )
 from foottrack_service.config import ConfigError
@@ -47,6 +48,7 @@ app.command()(recordings.replay)
 app.command()(watch.top)
 app.command()(watch.echo)
 app.command()(evaluate.evaluate)
+app.command()(walkinplace.trial)
 app.command()(bench.bench)
 app.command()(doctor.doctor)
 app.command()(security.relay)

@@ -6,12 +6,12 @@ import socket
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-from conftest import EPHEMERAL
-
 from foottrack_service.bus import Broker
 from foottrack_service.bus.security import load_keys, new_keys
 from foottrack_service.config import BusSettings
 from foottrack_service.curve_settings import CurveClient, CurveSettings, Role
+
+EPHEMERAL = BusSettings.beginning_at("0")
 
 
 class Keyring:

@@ -13,8 +13,7 @@ from typing import Any
 
 import pytest
 from bus_traffic import BODY, publish, take
-from conftest import EPHEMERAL
-from curve_keys import Keyring, three_free_ports
+from curve_keys import EPHEMERAL, Keyring, three_free_ports
 from typer.testing import CliRunner, Result
 
 from foottrack_protocol import encode
