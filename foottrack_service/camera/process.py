@@ -6,7 +6,9 @@ survive a fork.
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -27,6 +29,7 @@ LATE_S = 0.1
 DARK_GREY = 25.0
 PREVIEW_PERIOD_S = 0.2
 _JUDGE_EVERY = 60
+_NICENESS = 10
 
 
 @dataclass(frozen=True)
@@ -114,6 +117,9 @@ def work(connection: Connection, settings: dict[str, Any]) -> None:
     """The process's main: until told to stop, the source's end, or an error that is told first."""
     # Ctrl-C reaches every process of the terminal; the node says when it is time.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # A picture may wait, an IMU's sample may not: where cores are few, fusion goes first.
+    if sys.platform != "win32":
+        os.nice(_NICENESS)
     # Pictures come one by one: OpenCV's threads would only take the other core from fusion.
     cv2.setNumThreads(1)
     source: Source | None = None

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import zmq
 
-from foottrack_protocol import Message, encode
+from foottrack_protocol import Message, decode, encode
 from foottrack_protocol.messages import HeadPose, Imu
 from foottrack_service.cli.running import CommandFailed, run_loop
 from foottrack_service.config import BusSettings, Settings
@@ -38,6 +38,7 @@ _SETTLE = 60
 def camera_pairs(seconds: float, report: Callable[[str], None]) -> dict[str, Any]:
     """Milliseconds from writing an IMU's bytes to ``pose/body``, p50 and p99, camera on and off, each for ``seconds``.
 
+    Until it is published, and until a subscriber in another process has it, which shares the cores with all the rest.
     Raises CommandFailed where there are no ptys.
     """
     if sys.platform == "win32":
@@ -66,7 +67,7 @@ def camera_pairs(seconds: float, report: Callable[[str], None]) -> dict[str, Any
 def _measured(
     endpoints: BusSettings, service: Connection, imu: Any, seconds: float, report: Callable[[str], None]
 ) -> dict[str, Any]:
-    taken: dict[str, list[list[float]]] = {"on": [], "off": []}
+    taken: dict[str, list[Any]] = {"on": [], "off": []}
     with _Wearer(endpoints, imu) as wearer:
         for pair in range(PAIRS):
             # In turns who is first: what drifts meanwhile favours neither.
@@ -76,19 +77,24 @@ def _measured(
                 wearer.settle(service.poll, fixes=state == "on")
                 service.recv()
                 taken[state].append(wearer.latencies(seconds))
-    rates = [round(rate, 1) for rate in wearer.fix_rates]
     return {
-        "imu_bytes_to_pose_ms": {state: _quantiles(np.concatenate(runs)) for state, runs in taken.items()},
-        "ratio": {
-            name: round(
-                float(np.median([_at(q, on) / _at(q, off) for on, off in zip(taken["on"], taken["off"], strict=True)])),
-                3,
-            )
-            for name, q in (("p50", 50), ("p99", 99))
-        },
+        **{name: _compared(taken, column) for column, name in enumerate(("published", "received"))},
         "pairs": PAIRS,
         "samples_per_phase": min(len(run) for runs in taken.values() for run in runs),
-        "fixes_per_s": max(rates, default=0.0),
+        "fixes_per_s": round(max(wearer.fix_rates), 1),
+    }
+
+
+def _compared(taken: dict[str, list[Any]], column: int) -> dict[str, Any]:
+    """Camera on and off, ms, all phases together, and the median over the pairs of on / off."""
+    runs = {state: [np.array(phase)[:, column] for phase in phases] for state, phases in taken.items()}
+    pairs = list(zip(runs["on"], runs["off"], strict=True))
+    return {
+        **{f"{state}_ms": _quantiles(np.concatenate(phases)) for state, phases in runs.items()},
+        "ratio": {
+            name: round(float(np.median([np.percentile(on, q) / np.percentile(off, q) for on, off in pairs])), 3)
+            for name, q in (("p50", 50), ("p99", 99))
+        },
     }
 
 
@@ -140,14 +146,14 @@ class _Wearer:
             if time.perf_counter() > deadline:
                 raise CommandFailed("no feet were found in the pictures")
 
-    def latencies(self, seconds: float) -> list[float]:
-        """ms, one per sample."""
+    def latencies(self, seconds: float) -> list[tuple[float, float]]:
+        """ms to publishing and to receiving, per sample."""
         self._fixes, began = 0, time.perf_counter()
         found = [self._sample() for _ in range(int(seconds * _IMU_HZ))]
         self.fix_rates.append(self._fixes / (time.perf_counter() - began))
         return found
 
-    def _sample(self) -> float:
+    def _sample(self) -> tuple[float, float]:
         self._due = max(self._due + 0.5 / _IMU_HZ, time.perf_counter() - 0.1)
         _until(self._due)
         now = time.perf_counter_ns()
@@ -166,11 +172,12 @@ class _Wearer:
         began = time.perf_counter_ns()
         self._imu.send(sample)
         try:
-            while not self._count(self._back.recv_multipart()[0]):
+            while not self._count((frames := self._back.recv_multipart())[0]):
                 pass
         except zmq.Again:
             raise CommandFailed(f"no pose came of an IMU's sample within {1e-3 * _TIMEOUT_MS:g} s") from None
-        return (time.perf_counter_ns() - began) * 1e-6
+        received = time.perf_counter_ns()
+        return (decode(frames).t_pub - began) * 1e-6, (received - began) * 1e-6
 
     def _count(self, topic: bytes) -> bool:
         if topic == b"user/pose/body":
@@ -252,10 +259,6 @@ def _until(due: float) -> None:
     left = due - time.perf_counter()
     if left > 0:
         time.sleep(left)
-
-
-def _at(quantile: float, values: list[float]) -> float:
-    return float(np.percentile(values, quantile))
 
 
 def _quantiles(values: Any) -> dict[str, float]:
