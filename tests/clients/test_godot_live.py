@@ -82,6 +82,8 @@ def test_a_service_that_restarts_twice_is_found_again_and_the_loss_is_exact(
                 assert not publisher.publish("gait/event", step(number))
                 number += 1
             service.start()
+        while run.until("frames")["statistics"]["session"] == session:
+            pass
         publisher.publish("gait/event", FINAL)
         said = run.until("final")
     assert said["steps"] == [*range(50), *range(57, 107), *range(114, 164)]
