@@ -38,7 +38,9 @@ class Rejected:
 
 
 SPAN_S = 0.12
-"""Fixes that agree lie at most so far apart, one from the next."""
+"""Fixes that agree do so within this, or within what FEW of them take of a slow camera."""
+GAP_S = 0.3
+"""Fixes that agree lie at most so far apart, one from the next: a webcam in a dark room makes 5 pictures a second."""
 FEW = 3
 """So many that agree start a foot whose place is unknown."""
 SURE_SPAN_S = 0.3
@@ -74,11 +76,11 @@ class Candidates:
 
         ``sure_for``: seconds since the last accepted fix, of a foot that knows its place and speed well; else None.
         """
-        if self._kept and not 0 < rejected.t - self._kept[-1].t <= SPAN_S * 1e9:
+        if self._kept and not 0 < rejected.t - self._kept[-1].t <= GAP_S * 1e9:
             self._kept.clear()
         self._kept.append(rejected)
         if sure_for is None:
-            agreeing = self._agreeing(SPAN_S, FASTEST, TURN_SLACK)
+            agreeing = self._agreeing(max(SPAN_S, self._pace_s()), FASTEST, TURN_SLACK)
             enough = len(agreeing) >= FEW
         else:
             agreeing = self._agreeing(SPAN_S, FASTEST, SAME_TURN)
@@ -93,6 +95,12 @@ class Candidates:
         self._kept.clear()
         # Only the last few start the filter anew: the older ones belong to a time when it was still confused.
         return agreeing[-2 * FEW :]
+
+    def _pace_s(self) -> float:
+        """How long the last FEW fixes took, and a little."""
+        if len(self._kept) < FEW:
+            return 0.0
+        return 1.1e-9 * (self._kept[-1].t - self._kept[-FEW].t)
 
     def _agreeing(self, span: float, fastest: float, turn_slack: float) -> list[Rejected]:
         """Those of the last ``span`` s whose residuals lie on one straight drift with the newest one's."""
