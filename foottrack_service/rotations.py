@@ -68,6 +68,8 @@ def unrotate(q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
 def from_rotation_vector(rotvec: npt.ArrayLike) -> Array:
     """Exponential map: axis times angle in rad, shape (..., 3), to quaternion(s), shape (..., 4)."""
     r = np.asarray(rotvec, dtype=np.float64)
+    if r.ndim == 1:
+        return _exponential(*r.tolist())
     angle = np.linalg.norm(r, axis=-1, keepdims=True)
     half = 0.5 * angle
     # np.sinc is sin(pi x) / (pi x): exact and smooth through zero.
@@ -158,6 +160,12 @@ def continuous(q: npt.ArrayLike) -> Array:
     signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))
     q[1:] *= signs[:, None]
     return q
+
+
+def _exponential(x: float, y: float, z: float) -> Array:
+    angle = math.sqrt(x * x + y * y + z * z)
+    scale = 0.5 if angle < 1e-8 else math.sin(0.5 * angle) / angle
+    return np.array((x * scale, y * scale, z * scale, math.cos(0.5 * angle)))
 
 
 def _logarithm(x: float, y: float, z: float, w: float) -> Array:

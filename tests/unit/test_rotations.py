@@ -76,4 +76,5 @@ def test_one_and_many_give_the_same(a, b, v):
     assert np.allclose(rot.normalised(a[None])[0], a, rtol=0, atol=1e-15)
     assert np.allclose(rot.multiply(a[None], b)[0], rot.multiply(a, b), rtol=0, atol=1e-15)
     assert np.allclose(rot.rotate(a[None], v)[0], rot.rotate(a, v), rtol=0, atol=1e-15)
+    assert np.allclose(rot.from_rotation_vector(v[None])[0], rot.from_rotation_vector(v), rtol=0, atol=1e-15)
     assert np.allclose(rot.to_rotation_vector(a[None])[0], rot.to_rotation_vector(a), rtol=1e-12, atol=1e-15)
