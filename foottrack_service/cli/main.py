@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 
 import typer
@@ -64,6 +65,10 @@ app.add_typer(log.app, name="log", help="Look into recordings: info, cat, export
 
 def main() -> None:
     """Entry point: errors that a person can mend are one line and an exit code, not a traceback."""
+    # Messages are many small objects without cycles: looking for some after every 700 of them costs a replay 7 % and a
+    # live pose its p99.
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 50)
     running.set_up_logging()
     try:
         app()
