@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from foottrack_protocol.messages import BodyPose
-from foottrack_service.bridges import unity
+from foottrack_service import unity_axes
 from foottrack_service.bridges.limbs import Leg, leg
 from foottrack_service.bridges.osc import Osc, bundle
 from foottrack_service.bridges.settings import VmcSettings
@@ -69,4 +69,4 @@ def _leg(side: str, limb: Leg, hips_p: tuple[float, ...], hips_q: tuple[float, .
 
 
 def _transform(address: str, name: str, p: npt.ArrayLike, q: npt.ArrayLike) -> Osc:
-    return Osc(address, (name, *unity.position(p), *unity.rotation(q)))
+    return Osc(address, (name, *unity_axes.position(p), *unity_axes.rotation(q)))

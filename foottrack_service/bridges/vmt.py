@@ -7,7 +7,7 @@ tracker and 0 to switch it off.
 from __future__ import annotations
 
 from foottrack_protocol.messages import BodyPose
-from foottrack_service.bridges import unity
+from foottrack_service import unity_axes
 from foottrack_service.bridges.osc import Osc, bundle
 from foottrack_service.bridges.settings import VmtSettings
 from foottrack_service.bridges.trackers import TRACKERS, Tracker, trackers
@@ -46,4 +46,4 @@ class Vmt:
 
     def _message(self, name: str, tracker: Tracker, enable: int) -> Osc:
         index = self._first + TRACKERS.index(name)
-        return Osc(_ADDRESS, (index, enable, 0.0, *unity.position(tracker.p), *unity.rotation(tracker.q)))
+        return Osc(_ADDRESS, (index, enable, 0.0, *unity_axes.position(tracker.p), *unity_axes.rotation(tracker.q)))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from foottrack_protocol.messages import BodyPose
-from foottrack_service.bridges import unity
+from foottrack_service import unity_axes
 from foottrack_service.bridges.osc import Osc, message
 from foottrack_service.bridges.settings import VrchatSettings
 from foottrack_service.bridges.trackers import TRACKERS, Tracker, trackers
@@ -33,8 +33,8 @@ class Vrchat:
         sent = []
         for place, tracker in places.items():
             address = f"/tracking/trackers/{place}"
-            sent.append(message(Osc(f"{address}/position", unity.position(tracker.p))))
-            sent.append(message(Osc(f"{address}/rotation", unity.euler(tracker.q))))
+            sent.append(message(Osc(f"{address}/position", unity_axes.position(tracker.p))))
+            sent.append(message(Osc(f"{address}/rotation", unity_axes.euler(tracker.q))))
         return sent
 
     def farewell(self) -> list[bytes]:

@@ -1,4 +1,4 @@
-"""Places with a rotation, and from Unity's axes to ours and back."""
+"""Places with a rotation."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from foottrack_service import rotations
+from foottrack_service import rotations, unity_axes
 from foottrack_service.rotations import Array
 
 
@@ -40,9 +40,5 @@ def rigid(p: npt.ArrayLike, q: npt.ArrayLike) -> Rigid:
 
 
 def mirrored(place: Rigid) -> Rigid:
-    """Unity's left-handed axes (+Z forward) to the wire's (-Z forward), and back: z changes its sign.
-
-    A mirror turns the sense of rotations about the axes within its plane.
-    """
-    x, y, z, w = place.q
-    return Rigid(place.p * (1.0, 1.0, -1.0), np.array([-x, -y, z, w]))
+    """Unity's axes to the wire's, and back."""
+    return Rigid(np.array(unity_axes.position(place.p)), np.array(unity_axes.rotation(place.q)))

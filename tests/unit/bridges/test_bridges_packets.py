@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foottrack_protocol.messages import Pose
-from foottrack_service.bridges import unity
+from foottrack_service import unity_axes
 from foottrack_service.bridges.settings import VmcSettings, VmtSettings, VrchatSettings
 from foottrack_service.bridges.vmc import Vmc
 from foottrack_service.bridges.vmt import Vmt
@@ -90,8 +90,8 @@ def test_vmc_bones_put_together_are_the_body(
         ("RightFoot", pose.right.ankle.p),
     ):
         assert point is not None
-        assert np.allclose(joints[name][0], unity.position(point), atol=1e-5), name
-    assert angle_between(joints["RightFoot"][1], unity.rotation(pose.right.ankle.q)) < 1e-3
+        assert np.allclose(joints[name][0], unity_axes.position(point), atol=1e-5), name
+    assert angle_between(joints["RightFoot"][1], unity_axes.rotation(pose.right.ankle.q)) < 1e-3
 
 
 def test_vmc_without_headset_says_that_nothing_comes() -> None:
@@ -145,7 +145,9 @@ def test_vrchat_gets_trackers_and_the_head(knees: bool, places: str) -> None:
     for place in [*places, "head"]:
         assert told[f"/tracking/trackers/{place}/rotation"].values == pytest.approx([0.0, -30.0, 0.0], abs=1e-4)
     assert pose.left is not None
-    assert told["/tracking/trackers/2/position"].values == pytest.approx(unity.position(pose.left.ankle.p), abs=1e-6)
+    assert told["/tracking/trackers/2/position"].values == pytest.approx(
+        unity_axes.position(pose.left.ankle.p), abs=1e-6
+    )
 
 
 def test_vrchats_head_is_where_the_head_bone_begins() -> None:

@@ -1,4 +1,8 @@
-"""Unity's axes and angles: left-handed, +X right, +Y up, +Z forward; so SPEC's -Z is Unity's +Z."""
+"""Unity's axes and angles: left-handed, +X right, +Y up, +Z forward; so SPEC's -Z is Unity's +Z.
+
+The way there is the way back: z changes its sign, and a mirror turns the sense of rotations about the axes within its
+plane.
+"""
 
 from __future__ import annotations
 
