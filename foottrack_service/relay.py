@@ -24,6 +24,7 @@ from foottrack_protocol.topics import WELCOME
 from foottrack_service.bus.control_client import ControlClient
 from foottrack_service.bus.endpoints import HWM, MAX_FRAME_BYTES, Context, Socket, bind, release
 from foottrack_service.bus.errors import BusError, ControlError
+from foottrack_service.bus.revival import Revival
 from foottrack_service.bus.security import Credentials, connect, credentials
 from foottrack_service.bus.timesync import SyncedClock, synchronise
 from foottrack_service.bus.watch import SocketWatch
@@ -75,6 +76,8 @@ class Relay:
 
     async def run(self) -> None:
         """Answer and pass on requests, keep the clock, and say when the service is out of reach, until cancelled."""
+        for proxy in self._proxies:
+            proxy.attend(asyncio.get_running_loop())
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(synchronise(self.clock, self._asking))
             tasks.create_task(self._requests())
@@ -93,9 +96,10 @@ class Relay:
             _limit(socket)
         # What cannot be sent now is answered now, and not obeyed much later.
         self._remote.setsockopt(zmq.IMMEDIATE, 1)
+        revival = Revival(self._context, self._remote, self._service.control)
         connect(self._remote, self._service.control, self._credentials)
         control = bind(self._local, self.endpoints.control)
-        self._watches = (SocketWatch(self._local), SocketWatch(self._remote))
+        self._watches = (SocketWatch(self._local), SocketWatch(self._remote, revival))
         self._asking = ControlClient(self._context, self._service.control, self._credentials)
         self.endpoints = self.endpoints.model_copy(
             update={"ingress": up.endpoint, "egress": down.endpoint, "control": control}
@@ -155,8 +159,7 @@ class _Proxy:
     def __init__(
         self, context: Context, far: int, service: str, near: int, local: str, who: Credentials | None
     ) -> None:
-        self._context = context
-        self._steering = f"inproc://{uuid.uuid4().hex}"
+        steering = f"inproc://{uuid.uuid4().hex}"
         self._sockets = [context.socket(kind) for kind in (far, near, zmq.PAIR)]
         for socket in self._sockets:
             _limit(socket)
@@ -168,28 +171,46 @@ class _Proxy:
         # A lost connection ends the subscriptions that came over it: local publishers learn that the bus is gone.
         self._sockets[0].setsockopt(zmq.IMMEDIATE, 1)
         self.endpoint = bind(self._sockets[1], local)
-        bind(self._sockets[2], self._steering)
+        bind(self._sockets[2], steering)
+        self._steering = context.socket(zmq.PAIR)
+        self._steering.connect(steering)
+        self._service = service
+        self._ending = False
+        # The thread has the socket: it connects anew when it comes out of the proxy.
+        self._revival = Revival(context, self._sockets[0], service, self._interrupt)
         connect(self._sockets[0], service, who)
         self._thread = threading.Thread(target=self._run, name=f"relay {self.endpoint}", daemon=True)
 
     def start(self) -> None:
         self._thread.start()
 
+    def attend(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Connect anew where libzmq does not, from now on."""
+        self._revival.attend(loop)
+
     def stop(self) -> None:
         """Raises BusError when the thread does not end."""
-        steering = self._context.socket(zmq.PAIR)
-        steering.connect(self._steering)
-        steering.send(b"TERMINATE")
+        self._revival.leave()
+        self._ending = True
+        self._interrupt()
         self._thread.join(_STOP_TIMEOUT_S)
-        steering.close(0)
+        self._steering.close(0)
         if self._thread.is_alive():
             raise BusError(f"the relay did not stop within {_STOP_TIMEOUT_S:g} s")
+
+    def _interrupt(self) -> None:
+        self._steering.send(b"TERMINATE")
 
     def _run(self) -> None:
         far, near, steering = self._sockets
         with contextlib.suppress(zmq.ContextTerminated):
             zmq.proxy_steerable(far, near, None, steering)
+            while not self._ending:
+                far.disconnect(self._service)
+                far.connect(self._service)
+                zmq.proxy_steerable(far, near, None, steering)
             release(near, self.endpoint)
+        self._revival.close()
         for socket in self._sockets:
             socket.close(0)
 

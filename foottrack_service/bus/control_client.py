@@ -13,6 +13,7 @@ from foottrack_protocol.envelope import pack_map, unpack_map
 from foottrack_protocol.errors import DecodeError
 from foottrack_service.bus.endpoints import Context
 from foottrack_service.bus.errors import ControlError, ControlTimeout
+from foottrack_service.bus.revival import Revival
 from foottrack_service.bus.security import Credentials, connect, why_not
 from foottrack_service.bus.watch import SocketWatch
 
@@ -30,8 +31,9 @@ class ControlClient:
         self._socket.setsockopt(zmq.LINGER, 0)
         # Without a connection nothing is sent: a command that waits would be obeyed long after its sender gave up.
         self._socket.setsockopt(zmq.IMMEDIATE, 1)
+        revival = Revival(context, self._socket, endpoint)
         connect(self._socket, endpoint, credentials)
-        self._watch = SocketWatch(self._socket)
+        self._watch = SocketWatch(self._socket, revival)
 
     async def request(self, cmd: str, args: Mapping[str, Any] | None = None, timeout_s: float = 2.0) -> Any:
         """The result. Raises ControlError (its answer), ControlTimeout (none), EncodeError."""

@@ -17,6 +17,7 @@ from foottrack_service.bus.clock import BusClock, now
 from foottrack_service.bus.demand import Demand
 from foottrack_service.bus.endpoints import HWM, Context, Socket
 from foottrack_service.bus.errors import NotReady
+from foottrack_service.bus.revival import Revival
 from foottrack_service.bus.security import Credentials, connect, why_not
 from foottrack_service.bus.watch import SocketWatch
 
@@ -58,13 +59,17 @@ class Publisher:
         self._seq: dict[tuple[str, str], int] = {}
         self._live = False
         self._demand = Demand()
-        self._socket = _socket(context, endpoint, credentials)
-        self._watch = SocketWatch(self._socket)
+        self._socket = _socket(context)
+        self._revival = Revival(context, self._socket, endpoint)
+        connect(self._socket, endpoint, credentials)
+        self._watch = SocketWatch(self._socket, self._revival)
 
     @property
     def live(self) -> bool:
         """Whether the bus takes what is published now."""
         self._notice()
+        if not self._live:
+            self._revival.check()
         return self._live
 
     async def ready(self, timeout_s: float = 5.0) -> None:
@@ -81,7 +86,7 @@ class Publisher:
         deadline = time.monotonic() + timeout_s
         while not self.live:
             left_ms = int((deadline - time.monotonic()) * 1000)
-            if left_ms <= 0 or not self._socket.poll(left_ms):
+            if left_ms <= 0 or not self._revival.poll(left_ms):
                 raise NotReady(self._why_not())
 
     def wanted(self, user: str, stream: str) -> bool:
@@ -149,12 +154,11 @@ class Publisher:
                 self._demand.notice(frame)
 
 
-def _socket(context: Context, endpoint: str, credentials: Credentials | None) -> Socket:
+def _socket(context: Context) -> Socket:
     socket = context.socket(zmq.XPUB)
     socket.set_hwm(HWM)
     # The pipe ends with the connection, which the socket reports as the bus's unsubscription. With the pipe kept,
     # 10,000 old samples would be held back and burst onto a bus that comes back.
     socket.setsockopt(zmq.IMMEDIATE, 1)
     socket.setsockopt(zmq.XPUB_NODROP, 1)
-    connect(socket, endpoint, credentials)
     return socket

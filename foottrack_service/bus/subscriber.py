@@ -17,6 +17,7 @@ from foottrack_protocol.topics import WELCOME, Policy
 from foottrack_service.bus.clock import BusClock, now
 from foottrack_service.bus.endpoints import HWM, MAX_FRAME_BYTES, Context, Socket
 from foottrack_service.bus.errors import NotReady
+from foottrack_service.bus.revival import Revival
 from foottrack_service.bus.security import Credentials, connect, why_not
 from foottrack_service.bus.sequence import Stats
 from foottrack_service.bus.watch import SocketWatch
@@ -64,8 +65,10 @@ class Subscriber:
         self._token = b""
         self._early: list[Received] = []
         self._last_log: int | None = None
-        self._socket = _socket(context, endpoint, topics, credentials)
-        self._watch = SocketWatch(self._socket)
+        self._socket = _socket(context, topics)
+        self._revival = Revival(context, self._socket, endpoint)
+        connect(self._socket, endpoint, credentials)
+        self._watch = SocketWatch(self._socket, self._revival)
 
     async def ready(self, timeout_s: float = 5.0) -> None:
         """Wait until the bus knows the subscription: nothing published after that is missed. Raises NotReady."""
@@ -81,7 +84,7 @@ class Subscriber:
         deadline = time.monotonic() + timeout_s
         while not self._greeted():
             left_ms = int((deadline - time.monotonic()) * 1000)
-            if left_ms <= 0 or not self._socket.poll(left_ms):
+            if left_ms <= 0 or not self._revival.poll(left_ms):
                 raise NotReady(self._why_not())
 
     @property
@@ -92,7 +95,8 @@ class Subscriber:
     def drain(self, limit: int = BATCH) -> list[Received]:
         """What is there now, without waiting; at most ``limit`` messages leave the socket."""
         received, self._early = self._early, []
-        self._receive(received, limit)
+        if not self._receive(received, limit):
+            self._revival.check()
         return _newest(received) if self.policy is Policy.LATEST else received
 
     async def batches(self) -> AsyncIterator[list[Received]]:
@@ -231,11 +235,10 @@ def _newest(received: Iterable[Received]) -> list[Received]:
     return list(newest.values())
 
 
-def _socket(context: Context, endpoint: str, topics: Iterable[str], credentials: Credentials | None) -> Socket:
+def _socket(context: Context, topics: Iterable[str]) -> Socket:
     socket = context.socket(zmq.SUB)
     socket.set_hwm(HWM)
     socket.setsockopt(zmq.MAXMSGSIZE, MAX_FRAME_BYTES)
     for topic in (WELCOME.decode(), *topics):
         socket.subscribe(topic)
-    connect(socket, endpoint, credentials)
     return socket

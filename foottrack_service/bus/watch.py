@@ -12,6 +12,7 @@ from collections.abc import Callable
 import zmq
 
 from foottrack_service.bus.endpoints import Socket
+from foottrack_service.bus.revival import Revival
 
 # As ints: arithmetic with pyzmq's enums costs as much as the question itself.
 _EVENTS = int(zmq.EVENTS)
@@ -20,10 +21,11 @@ _POLLOUT = int(zmq.POLLOUT)
 
 
 class SocketWatch:
-    """Wakes coroutines of one event loop when a socket can be read or written."""
+    """Wakes coroutines of one event loop when a socket can be read or written, and has its connection looked after."""
 
-    def __init__(self, socket: Socket) -> None:
+    def __init__(self, socket: Socket, revival: Revival | None = None) -> None:
         self._socket = socket
+        self._revival = revival
         self._fd: int = socket.fileno()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._waiters: dict[asyncio.Future[None], int] = {}
@@ -57,6 +59,8 @@ class SocketWatch:
         if self._on_input is not None and self._loop is not None:
             self._loop.call_soon(self._on_input)
         self._disarm()
+        if self._revival is not None:
+            self._revival.close()
         self._wake(_POLLIN | _POLLOUT)
 
     def _events(self) -> int:
@@ -80,6 +84,9 @@ class SocketWatch:
             self._disarm()
             loop.add_reader(self._fd, self._on_word)
             self._loop = loop
+            if self._revival is not None:
+                # Connecting anew takes words back, too.
+                self._revival.attend(loop, self._on_word)
         return loop
 
     def _on_word(self) -> None:
@@ -96,6 +103,8 @@ class SocketWatch:
                 waiter.set_result(None)
 
     def _disarm(self) -> None:
+        if self._revival is not None:
+            self._revival.leave()
         if self._loop is not None and not self._loop.is_closed():
             self._loop.remove_reader(self._fd)
         self._loop = None
