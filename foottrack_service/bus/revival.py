@@ -1,7 +1,7 @@
 """Connects again where libzmq does not.
 
 libzmq gives a connection up for good when its peer breaks the protocol (zeromq/libzmq #4196): some other program
-listened on the port for a while, or a key was not on the list yet. Its monitor then reports the loss, and no new attempt.
+listened on the port for a while, or a key was not on the list yet. Its monitor then reports the loss, and no new try.
 """
 
 from __future__ import annotations
