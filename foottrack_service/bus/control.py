@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import inspect
 import logging
 from collections.abc import Awaitable, Callable, Mapping
@@ -32,13 +33,15 @@ MAX_WAITING = 64
 """Requests whose handlers wait at the same time; more are answered "busy"."""
 _BATCH = 64
 _STRICT = ConfigDict(strict=True)
+_OWN_CODES = frozenset({Code.BAD_REQUEST, Code.UNKNOWN_COMMAND, Code.BAD_ARGUMENTS, Code.BUSY, Code.INTERNAL})
 _log = logging.getLogger(__name__)
 
 
 class ControlServer:
     """Answers requests; ``hello``, ``time`` and ``status`` by itself. Whatever comes in gets an answer.
 
-    Its own codes are BAD_REQUEST, UNKNOWN_COMMAND, BAD_ARGUMENTS, BUSY and INTERNAL of foottrack_protocol.control.
+    Its own codes are BAD_REQUEST, UNKNOWN_COMMAND, BAD_ARGUMENTS, BUSY and INTERNAL of foottrack_protocol.control;
+    what it refuses with them is counted in ``sys/health`` as "control/<code>".
     """
 
     def __init__(
@@ -65,7 +68,8 @@ class ControlServer:
             return {"t": clock()}
 
         known = {"hello": hello, "status": status, "time": time, **handlers}
-        self._handlers = {name: validate_call(config=_STRICT)(handler) for name, handler in known.items()}
+        self._handlers = {name: _checked(handler) for name, handler in known.items()}
+        self._board = board
         self._waiting = 0
         self._socket = context.socket(zmq.ROUTER)
         self._socket.set_hwm(HWM)
@@ -122,9 +126,9 @@ class ControlServer:
                 COMMANDS[cmd].args.model_validate(args)
             result = handler(**args)
         except ValidationError as error:
-            return _failure(Code.BAD_ARGUMENTS, "; ".join(_detail(item) for item in error.errors()))
+            return self._failure(Code.BAD_ARGUMENTS, "; ".join(_detail(item) for item in error.errors()))
         except Exception as error:  # whatever a handler does, the client gets an answer
-            return _explained(error)
+            return self._explained(error)
         if inspect.isawaitable(result):
             self._waiting += 1
             return self._result(result)
@@ -134,7 +138,7 @@ class ControlServer:
         try:
             return {"ok": True, "result": await awaitable}
         except Exception as error:  # as above
-            return _explained(error)
+            return self._explained(error)
         finally:
             self._waiting -= 1
 
@@ -145,9 +149,38 @@ class ControlServer:
         try:
             payload = pack_map(answer)
         except EncodeError as error:
-            payload = pack_map(_explained(error))
+            payload = pack_map(self._explained(error))
         if not self._socket.closed:
             self._socket.send_multipart([*address, payload], zmq.NOBLOCK)
+
+    def _explained(self, error: Exception) -> dict[str, Any]:
+        if isinstance(error, ControlError):
+            return self._failure(error.code, error.message)
+        # What a handler raises within itself is no fault of the request's, whatever its kind.
+        cause = error.__cause__ if isinstance(error, _HandlerFailed) and error.__cause__ else error
+        _log.error("a control request failed", exc_info=cause)
+        return self._failure(Code.INTERNAL, f"{type(cause).__name__}: {cause}")
+
+    def _failure(self, code: str, message: str) -> dict[str, Any]:
+        if code in _OWN_CODES:
+            self._board.refuse(f"control/{code}")
+        return {"ok": False, "error": {"code": code, "message": message}}
+
+
+class _HandlerFailed(Exception):
+    """A handler's own ValidationError, which its caller's arguments did not cause."""
+
+
+def _checked(handler: Handler) -> Handler:
+    # As a plain function: of a coroutine function pydantic would look at the arguments only when it is awaited.
+    @functools.wraps(handler)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return handler(*args, **kwargs)
+        except ValidationError as error:
+            raise _HandlerFailed from error
+
+    return validate_call(config=_STRICT)(call)
 
 
 def _request(payload: bytes) -> tuple[str, dict[str, Any]]:
@@ -163,17 +196,6 @@ def _request(payload: bytes) -> tuple[str, dict[str, Any]]:
     if not isinstance(args, dict) or not all(isinstance(key, str) for key in args):
         raise ControlError(Code.BAD_REQUEST, "args must be a map with strings as keys")
     return cmd, args
-
-
-def _explained(error: Exception) -> dict[str, Any]:
-    if isinstance(error, ControlError):
-        return _failure(error.code, error.message)
-    _log.error("a control request failed", exc_info=error)
-    return _failure(Code.INTERNAL, f"{type(error).__name__}: {error}")
-
-
-def _failure(code: str, message: str) -> dict[str, Any]:
-    return {"ok": False, "error": {"code": code, "message": message}}
 
 
 def _detail(item: Any) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Mapping
 from typing import Literal
 
@@ -36,6 +36,7 @@ class HealthBoard:
         self._ticked: int | None = None
         self._topics: dict[str, TopicHealth] = {}
         self._drops: dict[str, int] = {}
+        self._refused: Counter[str] = Counter()
         self._latency: Latency | None = None
 
     def node(self, name: str, state: NodeState, error: str | None = None) -> None:
@@ -61,6 +62,10 @@ class HealthBoard:
         """One IMU sample's arrival to the hand-over of the pose it brought on."""
         self._latencies.append(ns)
 
+    def refuse(self, reason: str) -> None:
+        """Something was refused that names no topic: a control request."""
+        self._refused[reason] += 1
+
     def tick(self, t: int, stats: Stats) -> None:
         """Take what a monitor counted up to ``t`` (bus clock, ns); rates and latency are of the time since the last."""
         elapsed_s = 0.0 if self._ticked is None else (t - self._ticked) / 1e9
@@ -77,7 +82,7 @@ class HealthBoard:
             topics=self._topics,
             filters=self._filters,
             nodes=self._nodes,
-            drops=self._drops,
+            drops={**self._drops, **self._refused},
             latency_ms=self._latency,
         )
 

@@ -49,4 +49,5 @@ class Fix:
 
 def edge_distance(outline: Array, width: int, height: int) -> float:
     """Least distance of points (n, 2), px, to the picture's border; negative outside."""
-    return float(min(outline.min(), (width - 1 - outline[:, 0]).min(), (height - 1 - outline[:, 1]).min()))
+    (left, top), (right, bottom) = outline.min(axis=0).tolist(), outline.max(axis=0).tolist()
+    return float(min(left, top, width - 1 - right, height - 1 - bottom))

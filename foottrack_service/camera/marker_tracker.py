@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -82,22 +83,26 @@ class MarkerTracker:
         if not 0.0 < dt <= LOST_AFTER_S:
             return None
         p = track.p if track.v is None else track.p + track.v * dt
-        if p[2] < 0.1:
+        z = float(p[2])
+        if z < 0.1:
             return None
         drift = 0.5 * _ACCELERATION_M_S2 * dt * dt if track.v is not None else _SPEED_M_S * dt
-        focal, (width, height) = self._rig.intrinsics.focal, frame.gray.shape[::-1]
-        half = 1.3 * target.radius * focal / p[2] + _MARGIN_PX + min(drift, _SPEED_M_S * dt) * focal / p[2]
-        centre = self._rig.intrinsics.project(p[None])[0]
-        left, top = (int(max(0.0, c - half)) for c in centre)
-        right, bottom = (int(min(size, c + half + 1.0)) for c, size in zip(centre, (width, height), strict=True))
+        px_per_m = self._rig.intrinsics.focal / z
+        half = _MARGIN_PX + (1.3 * target.radius + min(drift, _SPEED_M_S * dt)) * px_per_m
+        u, v = self._rig.intrinsics.project(p[None])[0].tolist()
+        height, width = frame.gray.shape
+        left, top = int(max(0.0, u - half)), int(max(0.0, v - half))
+        right, bottom = int(min(width, u + half + 1.0)), int(min(height, v + half + 1.0))
         if right <= left or bottom <= top:
             return None
-        return Window(left, top, right, bottom, min(target.sizes.values()) * focal / float(p[2]))
+        return Window(left, top, right, bottom, target.smallest * px_per_m)
 
     def _resolve(self, target: Target, detections: Sequence[Detection], frame: Frame) -> list[Fix]:
         seen = [d for d in detections if d.id in target.corners]
+        if not seen:
+            return []
         blur = self._blur_px(target, frame)
-        sigma = float(np.hypot(CORNER_SIGMA_PX, _BLUR_NOISE * blur))
+        sigma = math.hypot(CORNER_SIGMA_PX, _BLUR_NOISE * blur)
         pose = solve_target(target, seen, self._rig.intrinsics, sigma)
         if pose is None:
             return []
@@ -129,8 +134,9 @@ class MarkerTracker:
         track = self._tracks.get(target.side)
         if track is None or track.v is None:
             return 0.0
-        across = track.v[:2] - track.v[2] * track.p[:2] / track.p[2]
-        return float(np.linalg.norm(across)) * frame.exposure * self._rig.intrinsics.focal / float(track.p[2])
+        (x, y, z), (vx, vy, vz) = track.p.tolist(), track.v.tolist()
+        across = math.hypot(vx - vz * x / z, vy - vz * y / z)
+        return across * frame.exposure * self._rig.intrinsics.focal / z
 
     def _follow(self, target: Target, t: int, p: Array) -> None:
         before = self._tracks.get(target.side)

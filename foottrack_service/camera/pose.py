@@ -48,8 +48,10 @@ class _Fit:
     rotvec: Array
     R: Array
     p: Array
+    jacobian: Array
+    """(2n, 6) of the n rays by rotation vector and place."""
     squares: float
-    cov: Array
+    """Sum of the residuals', px^2."""
 
 
 def solve_target(
@@ -70,7 +72,7 @@ def solve_target(
     for i in best_first[:2]:
         tag = next(tag for tag in target.tags if tag.id == seen[i].id)
         for rotvec, place in _ippe(tag.size, rays[4 * i : 4 * i + 4]):
-            fit = _refine(*_of_target(tag, rotvec, place), model, rays, intrinsics.focal, sigma_px)
+            fit = _refine(*_of_target(tag, rotvec, place), model, rays, intrinsics.focal)
             if fit is not None and not any(_same(fit, other) for other in fits):
                 fits.append(fit)
     if not fits:
@@ -79,7 +81,9 @@ def solve_target(
     first = fits[0]
     floor = sigma_px**2 * len(rays)
     second = next((fit for fit in fits[1:] if fit.squares < _WORSE**2 * (first.squares + floor)), None)
-    cov = first.cov
+    cov = _covariance(first, intrinsics.focal, sigma_px)
+    if cov is None:
+        return None
     if second is not None:
         # The position lies between the two solutions, and which is right is not known here.
         apart = second.p - first.p
@@ -89,7 +93,7 @@ def solve_target(
         rotations.from_rotation_vector(first.rotvec),
         None if second is None else rotations.from_rotation_vector(second.rotvec),
         cov,
-        float(np.sqrt(first.squares / len(rays))),
+        math.sqrt(first.squares / len(rays)),
     )
 
 
@@ -115,7 +119,7 @@ def _of_target(tag: Tag, rotvec: Array, place: Array) -> tuple[Array, Array]:
     return _vector(cv2.Rodrigues(R)[0]), _vector(place - R @ np.asarray(tag.p))
 
 
-def _refine(rotvec: Array, p: Array, model: Array, rays: Array, focal: float, sigma_px: float) -> _Fit | None:
+def _refine(rotvec: Array, p: Array, model: Array, rays: Array, focal: float) -> _Fit | None:
     refined = cv2.solvePnPRefineLM(
         model, rays, _IDENTITY, None, rotvec.reshape(3, 1).copy(), p.reshape(3, 1).copy(), _CRITERIA
     )
@@ -126,16 +130,19 @@ def _refine(rotvec: Array, p: Array, model: Array, rays: Array, focal: float, si
     if (model @ R[2]).min() + place[2] <= _NEAREST_M:
         return None
     projected, jacobian = cv2.projectPoints(model, rotvec, place, _IDENTITY, None)
-    residual = focal * (projected.reshape(-1, 2) - rays).ravel()
-    jacobian = focal * jacobian[:, :6]
-    squares = float(residual @ residual)
+    residual = (projected.reshape(-1, 2) - rays).ravel()
+    return _Fit(rotvec, R, place, np.asarray(jacobian[:, :6]), focal**2 * float(residual @ residual))
+
+
+def _covariance(fit: _Fit, focal: float, sigma_px: float) -> Array | None:
+    """Of the place, (3, 3); None where the corners do not determine it."""
     # A prior on the corners' noise, updated by this picture's own residuals: blur shows in them.
-    variance = (_CONFIDENCE * sigma_px**2 + squares) / (_CONFIDENCE + residual.size - 6)
-    sound, inverse = cv2.invert(jacobian.T @ jacobian, flags=cv2.DECOMP_CHOLESKY)
+    variance = (_CONFIDENCE * sigma_px**2 + fit.squares) / (_CONFIDENCE + len(fit.jacobian) - 6)
+    sound, inverse = cv2.invert(fit.jacobian.T @ fit.jacobian, flags=cv2.DECOMP_CHOLESKY)
     if not sound or not math.isfinite(inverse.sum()):
         return None
-    cov = variance * np.asarray(inverse[3:, 3:], dtype=np.float64)
-    return _Fit(rotvec, R, place, squares, 0.5 * (cov + cov.T))
+    cov = (0.5 * variance / focal**2) * np.asarray(inverse[3:, 3:], dtype=np.float64)
+    return cov + cov.T
 
 
 def _vector(column: Any) -> Array:

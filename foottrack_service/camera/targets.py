@@ -35,7 +35,12 @@ class Target:
     tags: tuple[Tag, ...]
     corners: dict[int, Array] = field(init=False, repr=False, compare=False)
     """Per tag id the (4, 3) corners in the target's frame."""
-    sizes: dict[int, float] = field(init=False, repr=False, compare=False)
+    centres: dict[int, Array] = field(init=False, repr=False, compare=False)
+    """Per tag id its centre (3,) there."""
+    smallest: float = field(init=False, repr=False, compare=False)
+    """Size of the smallest tag, m."""
+    radius: float = field(init=False, repr=False, compare=False)
+    """Largest distance of a corner from the target's origin, m."""
 
     def __post_init__(self) -> None:
         ids = [tag.id for tag in self.tags]
@@ -44,12 +49,10 @@ class Target:
         if not all(0.0 < tag.size < 1.0 for tag in self.tags):
             raise ValueError(f"tag sizes of the {self.side} target are in metres, above 0 and below 1")
         object.__setattr__(self, "corners", {tag.id: tag.corners() for tag in self.tags})
-        object.__setattr__(self, "sizes", {tag.id: tag.size for tag in self.tags})
-
-    @property
-    def radius(self) -> float:
-        """Largest distance of a corner from the target's origin, m."""
-        return float(max(np.linalg.norm(corners, axis=1).max() for corners in self.corners.values()))
+        object.__setattr__(self, "centres", {tag.id: np.array(tag.p) for tag in self.tags})
+        object.__setattr__(self, "smallest", min(tag.size for tag in self.tags))
+        reach = max(np.linalg.norm(corners, axis=1).max() for corners in self.corners.values())
+        object.__setattr__(self, "radius", float(reach))
 
 
 def owners(targets: Sequence[Target]) -> Mapping[int, Target]:

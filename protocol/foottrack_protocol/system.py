@@ -77,7 +77,9 @@ class Health(Body):
         default={}, description="by `user/side`"
     )
     nodes: Annotated[dict[Str, NodeHealth], Field(max_length=MAX_ITEMS)] = Field(default={}, description="by name")
-    drops: Counts = Field(default={}, description="refused messages that name no topic, by reason")
+    drops: Counts = Field(
+        default={}, description="refused messages that name no topic, by reason; refused requests as `control/<code>`"
+    )
     latency_ms: Latency | None = None
 
 

@@ -43,6 +43,8 @@ class Service:
             "break": self.fail,
             "unpackable": lambda: {"x": object()},
             "later/break": self.fail_later,
+            "misuse": self.misuse,
+            "later/misuse": self.misuse_later,
         }
         session = SessionInfo(users=["user"], config_hash="abc", clock=self.clock)
         self.server = ControlServer(context, LOCAL, handlers, session=session, board=self.board, clock=self.clock)
@@ -66,6 +68,12 @@ class Service:
     async def fail_later(self) -> None:
         await asyncio.sleep(0)
         raise RuntimeError("broken later")
+
+    def misuse(self) -> None:
+        Session.model_validate({"number": "none"})
+
+    async def misuse_later(self) -> None:
+        self.misuse()
 
 
 @pytest.fixture
@@ -129,6 +137,27 @@ def test_arguments_are_checked_against_the_handler(run: Run, service: Service, c
 
     run(serving(service, scenario()))
     assert service.names == ["walk-1"]
+
+
+def test_a_handler_that_waits_has_its_arguments_checked_as_well(
+    run: Run, service: Service, client: ControlClient
+) -> None:
+    async def scenario() -> None:
+        for bad, named in (({"number": "three"}, "number"), ({"numbr": 3}, "numbr"), ({}, "number")):
+            code, message = await failure(client, "wait", bad)
+            assert code == "bad_arguments"
+            assert named in message
+        await failure(client, "no/such")
+        status = Health.model_validate(await client.request("status"))
+        assert status.drops == {"control/bad_arguments": 3, "control/unknown_command": 1}
+        # What goes wrong within a handler is not the request's fault.
+        for cmd in ("misuse", "later/misuse"):
+            code, message = await failure(client, cmd)
+            assert code == "internal"
+            assert message.startswith("ValidationError: ")
+
+    run(serving(service, scenario()))
+    assert service.waiting == 0
 
 
 def test_failures_are_answered_and_do_not_end_the_server(run: Run, service: Service, client: ControlClient) -> None:
