@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, EnvSettingsSource, PydanticBaseSettingsSource, SettingsConfigDict
 
 from foottrack_protocol.frames import TAG_ON_INSTEP
@@ -26,6 +26,7 @@ from foottrack_service.curve_settings import CurveSettings
 from foottrack_service.gait.settings import GaitSettings
 from foottrack_service.headset.settings import HeadsetSettings
 from foottrack_service.imu.settings import ImuSettings
+from foottrack_service.section import Section
 
 DEFAULT_FILE = Path("foottrack.toml")
 _log = logging.getLogger(__name__)
@@ -34,12 +35,6 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 class ConfigError(Exception):
     """Settings that cannot be used; the text names the place and what was wrong."""
-
-
-class Section(BaseModel):
-    """Base of all sections: a misspelt key is an error, not silently ignored."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Placement(Section):

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import Field, StringConstraints, model_validator
+
+from foottrack_service.section import Section
 
 Role = Literal["publish", "subscribe", "control"]
 ROLES: tuple[Role, ...] = ("publish", "subscribe", "control")
@@ -14,11 +16,7 @@ PublicKey = Annotated[str, StringConstraints(pattern=r"^[0-9a-zA-Z.\-:+=^!/*?&<>
 """32 bytes in Z85 (https://rfc.zeromq.org/spec/32/), as `foottrack keys new` prints them."""
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class CurveClient(_Section):
+class CurveClient(Section):
     """Somebody who is let in."""
 
     name: str = Field(description="for the log")
@@ -26,7 +24,7 @@ class CurveClient(_Section):
     roles: tuple[Role, ...] = Field(default=ROLES, description="what it may do; all, unless fewer are named")
 
 
-class CurveSettings(_Section):
+class CurveSettings(Section):
     """Keys. The service has `secret`, `listen` and `clients`; who connects to it from another host `secret` and
     `service`."""
 

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from foottrack_service.section import Section
 
 Hertz = Annotated[float, Field(gt=0.0, le=1000.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Port = Annotated[int, Field(ge=1, le=65535)]
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class TargetSettings(_Section):
+class TargetSettings(Section):
     """What all have."""
 
     enabled: bool = False
@@ -55,7 +53,7 @@ class VmtSettings(TargetSettings):
     )
 
 
-class BridgesSettings(_Section):
+class BridgesSettings(Section):
     """All of them."""
 
     vmc: VmcSettings = VmcSettings()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
+
+from foottrack_service.section import Section
 
 if TYPE_CHECKING:
     from foottrack_service.camera.rig import Intrinsics
@@ -19,11 +21,7 @@ DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 """How many coefficients OpenCV's models have."""
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class LensSettings(_Section):
+class LensSettings(Section):
     """What `calibrate camera` finds, px; OpenCV's distortion coefficients."""
 
     width: Pixels = 848
@@ -49,7 +47,7 @@ class LensSettings(_Section):
         return Intrinsics(self.width, self.height, self.fx, self.fy, self.cx, self.cy, self.distortion)
 
 
-class RealSenseSettings(_Section):
+class RealSenseSettings(Section):
     """Intel RealSense with depth."""
 
     serial: str = Field(default="", description="which one, when there are several")
@@ -62,7 +60,7 @@ class RealSenseSettings(_Section):
     readout: NotNegative = Field(default=0.010, description="first row's exposure to the last's, s")
 
 
-class WebcamSettings(_Section):
+class WebcamSettings(Section):
     """A plain camera: tags only, no depth."""
 
     device: str = Field(default="0", description="number, path or address, as OpenCV takes it")
@@ -71,7 +69,7 @@ class WebcamSettings(_Section):
     readout: NotNegative = Field(default=0.016, description="first row's exposure to the last's, s")
 
 
-class FolderSettings(_Section):
+class FolderSettings(Section):
     """A recorded RGB-D sequence in the layout of TUM's benchmark."""
 
     path: str = ""
@@ -79,7 +77,7 @@ class FolderSettings(_Section):
     loop: bool = False
 
 
-class RenderedSettings(_Section):
+class RenderedSettings(Section):
     """The simulation's pictures."""
 
     task: str = Field(default="steps", description="what the simulated person does")
@@ -92,7 +90,7 @@ class RenderedSettings(_Section):
     start: int | None = Field(default=None, description="bus time at which the task begins, ns; now, unless given")
 
 
-class SourceSettings(_Section):
+class SourceSettings(Section):
     """Where pictures come from."""
 
     kind: Literal["none", "realsense", "opencv", "folder", "rendered"] = "none"

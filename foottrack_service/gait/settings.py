@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from foottrack_service.section import Section
 
 
-class GaitSettings(BaseModel):
+class GaitSettings(Section):
     """How an avatar walks where its user walks in place."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     mode: Literal["ours", "reference", "keyframe"] = Field(
         default="ours",

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from foottrack_protocol.messages import Quat, Vec3
+from foottrack_service.section import Section
 
 Seconds = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class RigidSettings(_Section):
+class RigidSettings(Section):
     """A part's place [m] and rotation (part to parent) on its parent."""
 
     p: Vec3 = (0.0, 0.0, 0.0)
     q: Quat = (0.0, 0.0, 0.0, 1.0)
 
 
-class VmcSettings(_Section):
+class VmcSettings(Section):
     """Virtual Motion Capture's protocol: OSC over UDP, Unity's axes."""
 
     host: str = Field(default="127.0.0.1", description="where it is listened; 0.0.0.0 takes it from other machines too")
@@ -39,7 +36,7 @@ class VmcSettings(_Section):
     )
 
 
-class OpenVrSettings(_Section):
+class OpenVrSettings(Section):
     """SteamVR's runtime. Truth is for evaluation: a tracker strapped to the foot."""
 
     truth_left: str = Field(default="", description="serial of the tracker or controller on the left foot: truth/left")
@@ -48,7 +45,7 @@ class OpenVrSettings(_Section):
     ankle_right: RigidSettings = Field(default=RigidSettings(), description="likewise")
 
 
-class OpenXrSettings(_Section):
+class OpenXrSettings(Section):
     """An OpenXR runtime that allows sessions without pictures (XR_MND_headless)."""
 
     inferred: bool = Field(
@@ -56,7 +53,7 @@ class OpenXrSettings(_Section):
     )
 
 
-class HeadsetSettings(_Section):
+class HeadsetSettings(Section):
     """Where the head's pose comes from."""
 
     source: Literal["bus", "vmc", "openvr", "openxr"] = Field(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
 from foottrack_service.imu.axes import FLAT_ON_THE_FOOT, Axes
 from foottrack_service.imu.formats.slimevr import DEFAULT_PORT
+from foottrack_service.section import Section
 
 Format = Literal["off", "ascii", "rvc", "bno08x", "raw", "slimevr"]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -18,11 +19,7 @@ def _axes(text: str) -> str:
     return text
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ImuDeviceSettings(_Section):
+class ImuDeviceSettings(Section):
     """The IMU on one foot."""
 
     format: Format = Field(default="off", description="what it speaks; off: somebody else publishes it, or nobody")
@@ -51,7 +48,7 @@ class ImuDeviceSettings(_Section):
     )
 
 
-class ImuSettings(_Section):
+class ImuSettings(Section):
     """Both feet's IMUs."""
 
     left: ImuDeviceSettings = ImuDeviceSettings()

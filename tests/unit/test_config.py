@@ -1,10 +1,12 @@
 """Settings: the layers, where each value came from, and what is wrong said with its place."""
 
+import re
 from pathlib import Path
 
 import pytest
 
 from foottrack_service import config
+from foottrack_service.cli.settings import commented
 from foottrack_service.config import BusSettings, ConfigError, Settings
 
 
@@ -54,6 +56,24 @@ def test_what_is_wrong_names_its_place(tmp_path, text, place):
 def test_a_missing_file_is_said(tmp_path):
     with pytest.raises(ConfigError, match=r"nothing\.toml"):
         config.load(tmp_path / "nothing.toml")
+
+
+def test_a_table_that_says_a_part_leaves_the_rest_at_its_default(tmp_path):
+    loaded = config.load(write(tmp_path, "[camera.mount]\np = [0.0, 0.01, -0.07]\n[feet.left.marker]\n")).settings
+    default = Settings()
+    assert loaded.camera.mount.p == (0.0, 0.01, -0.07)
+    assert loaded.camera.mount.q == default.camera.mount.q
+    assert loaded.feet == default.feet
+
+
+def test_the_written_settings_file_changes_nothing_commented_or_not(tmp_path):
+    text = commented(Settings())
+    assert config.load(write(tmp_path, text)).settings == Settings()
+    uncommented = re.sub(r"^# (\[.*\]|\w+ = (?!\.\.\.).*)$", r"\1", text, flags=re.MULTILINE)
+    assert uncommented.count("\n# ") < text.count("\n# ") - 100
+    loaded = config.load(write(tmp_path, uncommented))
+    assert loaded.settings == Settings()
+    assert len(loaded.origins) > 100
 
 
 def test_toml_round_trip_keeps_every_bit():
