@@ -114,7 +114,12 @@ class Publisher:
         return message
 
     def send(self, message: Message) -> bool:
-        """Send a message as it is, with its own ``src``, ``sid`` and ``seq`` (replay). Raises as ``publish``."""
+        """Send a message as it is, with its own ``src``, ``sid`` and ``seq`` (replay). Raises as ``publish``.
+
+        Its stamps are of our clock: it is not valid either while that is not healthy.
+        """
+        if self._healthy is not None and not self._healthy():
+            message = message._replace(valid=False)
         return self.send_frames(encode(message))
 
     def send_frames(self, frames: tuple[bytes, bytes]) -> bool:

@@ -24,6 +24,9 @@ MAX_DRIFT = 100e-6
 MAX_AGE_NS = 10_000_000_000
 """An offset that old is not fresh: five bursts were missed."""
 
+FIRST_ANSWER_S = 2.0
+"""A first answer waits for the connection, too."""
+
 Ask = Callable[[], Awaitable[int]]
 """Asks the service for its time, ns."""
 
@@ -112,7 +115,7 @@ async def clock_of(client: ControlClient) -> BusClock:
     Raises ControlError when the service does not answer.
     """
     clock = SyncedClock()
-    await _ask_time(client)
+    await _ask_time(client, FIRST_ANSWER_S)
     clock.on_burst(await measure(lambda: _ask_time(client), clock.own))
     if clock.offset is None or clock.uncertainty is None:
         raise ControlTimeout("the service answers too slowly to tell its clock")
@@ -127,8 +130,8 @@ async def synchronise(clock: SyncedClock, client: ControlClient, period_s: float
         await asyncio.sleep(period_s)
 
 
-async def _ask_time(client: ControlClient) -> int:
-    answer = await client.request("time", timeout_s=0.5)
+async def _ask_time(client: ControlClient, timeout_s: float = 0.5) -> int:
+    answer = await client.request("time", timeout_s=timeout_s)
     t = answer.get("t") if isinstance(answer, dict) else None
     if not isinstance(t, int):
         raise ControlError("bad_answer", "the answer to 'time' has no time")

@@ -10,9 +10,9 @@ import typer
 
 from foottrack_protocol.frames import SIDES
 from foottrack_protocol.messages import Imu, ImuCalibration, ImuValues, Side
-from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.subscriber import Subscriber
 from foottrack_service.calibration.store import Store, StoreError
+from foottrack_service.cli.joining import joined
 from foottrack_service.cli.running import (
     CommandFailed,
     ConfigOption,
@@ -62,7 +62,7 @@ def imu(
 
 async def calibrate(settings: Settings, timeout_s: float, tap: bool, say: Callable[[str], None]) -> dict[str, Any]:
     """Both steps on a running bus; publishes what was found. Raises CommandFailed, NotReady."""
-    with Bus.connect(settings.bus) as bus:
+    async with joined(settings) as bus:
         subscriber = bus.subscriber([f"{settings.user}/imu/"])
         publisher = bus.publisher("calibrate-imu")
         await subscriber.ready()

@@ -12,9 +12,9 @@ import typer
 
 from foottrack_protocol.messages import Imu, ImuCalibration, ImuValues, Side
 from foottrack_service import rotations as rot
-from foottrack_service.bus.connection import Bus
 from foottrack_service.calibration.store import Store, StoreError
 from foottrack_service.cli.calibrate_imu import FIND_S, LOOK_S
+from foottrack_service.cli.joining import joined
 from foottrack_service.cli.running import (
     CommandFailed,
     ConfigOption,
@@ -63,7 +63,7 @@ def mounting(
 
 async def calibrate(settings: Settings, timeout_s: float, say: Callable[[str], None]) -> dict[Side, ImuValues]:
     """On a running bus; publishes what was found. Raises CommandFailed, NotReady."""
-    with Bus.connect(settings.bus) as bus:
+    async with joined(settings) as bus:
         subscriber = bus.subscriber([f"{settings.user}/imu/"])
         publisher = bus.publisher("calibrate-mounting")
         await subscriber.ready()

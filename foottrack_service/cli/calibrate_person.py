@@ -14,13 +14,13 @@ from typing import Annotated, Any
 
 import typer
 
-from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.errors import ControlError
 from foottrack_service.calibration.body import BodyFlow
 from foottrack_service.calibration.floor import FloorFlow
 from foottrack_service.calibration.flow import Flow, Refused
 from foottrack_service.calibration.heading import HeadingFlow
 from foottrack_service.calibration.mount import MountFlow
+from foottrack_service.cli.joining import joined
 from foottrack_service.cli.running import (
     ConfigOption,
     ConnectOption,
@@ -132,7 +132,7 @@ async def ask(
     settings: Settings, kind: str, args: dict[str, Any], flow: Flow, countdown: int, say: Say, ring: Ring
 ) -> Any:
     """The service's answer; meanwhile ``flow`` watches the same streams for what to say. Raises BusError."""
-    with Bus.connect(settings.bus) as bus:
+    async with joined(settings) as bus:
         subscriber = bus.subscriber([f"{settings.user}/{stream}" for stream in flow.streams])
         await subscriber.ready()
         say(flow.progress.text)

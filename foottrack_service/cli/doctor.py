@@ -12,6 +12,7 @@ from foottrack_protocol import PROTOCOL_MAJOR
 from foottrack_protocol.frames import SIDES
 from foottrack_service.cli.doctor_clocks import clock, stamps
 from foottrack_service.cli.findings import Finding
+from foottrack_service.cli.joining import joined
 from foottrack_service.cli.running import ConfigOption, ConnectOption, JsonOption, print_json, run_loop, settings_for
 from foottrack_service.config import Settings
 
@@ -74,7 +75,7 @@ def _bridges(settings: Settings) -> list[Finding]:
 
 async def _service(settings: Settings, brief: bool) -> list[Finding]:
     from foottrack_service.bus.connection import Bus
-    from foottrack_service.bus.errors import ControlError
+    from foottrack_service.bus.errors import BusError, ControlError
 
     with Bus.connect(settings.bus) as bus:
         client = bus.control()
@@ -87,7 +88,12 @@ async def _service(settings: Settings, brief: bool) -> list[Finding]:
         if major != PROTOCOL_MAJOR:
             found.append(Finding("error", "protocol", f"it speaks {major}, we {PROTOCOL_MAJOR}", "Update the older."))
         if not brief:
-            found += [await clock(client), *await stamps(bus, settings.user)]
+            found.append(await clock(client))
+            try:
+                async with joined(settings) as synchronised:
+                    found += await stamps(synchronised, settings.user)
+            except BusError as error:
+                found.append(Finding("warning", "stamps", str(error)))
         return found + await _streams(client, settings.user)
 
 

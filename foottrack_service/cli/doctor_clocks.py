@@ -39,7 +39,7 @@ async def clock(client: ControlClient) -> Finding:
 
 
 async def stamps(bus: Bus, user: str, listen_s: float = LISTEN_S) -> list[Finding]:
-    """How old the measurements' stamps are on arrival, each stream's. Only right on the service's own host."""
+    """How old the measurements' stamps are on arrival, each stream's. ``bus`` has the service's clock."""
     measured = [f"{user}/{topic.stream}" for topic in TOPICS.values() if topic.role is Role.MEASUREMENT]
     ages: dict[str, list[float]] = defaultdict(list)
     subscriber = bus.subscriber(measured)

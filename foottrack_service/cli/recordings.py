@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 from rich.status import Status
 
+from foottrack_service.cli.joining import joined
 from foottrack_service.cli.running import (
     EXIT_USAGE,
     CommandFailed,
@@ -97,11 +98,10 @@ def replay(
 
 
 async def _record(settings: Settings, file: Path, seconds: float | None, raw: bool) -> None:
-    from foottrack_service.bus.connection import Bus
     from foottrack_service.recording import node
 
     started: asyncio.Future[RecordingWriter] = asyncio.get_running_loop().create_future()
-    with Bus.connect(settings.bus) as bus:
+    async with joined(settings) as bus:
         task = asyncio.ensure_future(node.run(bus, settings, file, raw=raw, on_started=started.set_result))
         shown = asyncio.ensure_future(_show_recording(started, file))
         try:
@@ -135,7 +135,6 @@ async def _replay(settings: Settings, file: Path, rate: float, loop: bool, resul
     # All before the first message is due: an import in the running loop would hold it up.
     from foottrack_protocol.topics import Role
     from foottrack_service.bus import control  # noqa: F401
-    from foottrack_service.bus.connection import Bus
     from foottrack_service.cli import keys  # noqa: F401
     from foottrack_service.recording.play import play
     from foottrack_service.recording.reader import open_recording
@@ -145,7 +144,7 @@ async def _replay(settings: Settings, file: Path, rate: float, loop: bool, resul
     roles = [role for role in Role if role not in left_out]
     running = asyncio.get_running_loop()
     started: asyncio.Future[LiveReplay] = running.create_future()
-    with Bus.connect(settings.bus) as bus:
+    async with joined(settings) as bus:
         task = asyncio.ensure_future(
             play(bus, recording, rate=rate, loop=loop, user=user, roles=roles, on_started=started.set_result)
         )

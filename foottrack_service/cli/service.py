@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from foottrack_service.calibration.store import Store
+from foottrack_service.cli.joining import joined
 from foottrack_service.cli.running import CommandFailed, ConfigOption, ConnectOption, UserOption, run_loop, settings_for
 from foottrack_service.config import Settings
 
@@ -70,20 +71,11 @@ async def _serve(settings: Settings) -> None:
 
 async def _one_node(name: str, settings: Settings) -> None:
     from foottrack_service.app import NODES
-    from foottrack_service.bus.connection import Bus
-    from foottrack_service.bus.timesync import SyncedClock, clock_of, synchronise
+    from foottrack_service.bus.timesync import SyncedClock
 
-    with Bus.connect(settings.bus) as bus:
-        await bus.subscriber(["sys/session"]).ready()
-        clock = await clock_of(bus.control())
-    remote = clock if isinstance(clock, SyncedClock) else None
-    if remote is not None and (name == "camera" or (name == "headset" and settings.headset.source == "openxr")):
-        raise CommandFailed(f"the {name}'s stamps are of its own host's clock: run it on the service's host")
-    with Bus.connect(settings.bus, clock=clock) as bus:
+    async with joined(settings) as bus:
+        own_clock = name == "camera" or (name == "headset" and settings.headset.source == "openxr")
+        if own_clock and isinstance(bus.clock, SyncedClock):
+            raise CommandFailed(f"the {name}'s stamps are of its own host's clock: run it on the service's host")
         typer.echo(f"{name} runs on {settings.bus.ingress}. Ctrl-C ends it.", err=True)
-        keeping = None if remote is None else asyncio.ensure_future(synchronise(remote, bus.control()))
-        try:
-            await asyncio.shield(asyncio.ensure_future(NODES[name].run(bus, settings)))
-        finally:
-            if keeping is not None:
-                keeping.cancel()
+        await asyncio.shield(asyncio.ensure_future(NODES[name].run(bus, settings)))

@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 from rich.progress import Progress
 
+from foottrack_service.cli.joining import joined
 from foottrack_service.cli.running import (
     EXIT_USAGE,
     CommandFailed,
@@ -28,7 +29,7 @@ def sim(
     ] = "walk-in-place",
     seed: Annotated[int, typer.Option("--seed", help="Another seed is another person with other noise.")] = 1,
     seconds: Annotated[
-        float | None, typer.Option("--seconds", min=0.5, help="How long; the task's own if absent.")
+        float | None, typer.Option("--seconds", min=1.0, help="How long; the task's own if absent.")
     ] = None,
     imu_hz: Annotated[float, typer.Option("--imu-hz", min=20.0, max=1000.0, help="Rate of the IMUs.")] = 100.0,
     imu: Annotated[
@@ -97,8 +98,7 @@ def write_recording(scenario: Any, settings: Settings, out: Path) -> None:
 
 
 async def _publish(settings: Settings, scenario: Any) -> None:
-    from foottrack_service.bus.connection import Bus
     from foottrack_service.simulation import node
 
-    with Bus.connect(settings.bus) as bus:
+    async with joined(settings) as bus:
         await node.run(bus, settings, scenario)

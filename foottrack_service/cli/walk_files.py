@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from foottrack_service.cli.joining import joined
 from foottrack_service.cli.running import EXIT_USAGE, CommandFailed
 
 if TYPE_CHECKING:
@@ -130,10 +131,8 @@ def stream_bodies(walk: Walk, rate_hz: float) -> Iterator[tuple[int, str, Any]]:
 
 async def play_walk(walk: Walk, settings: Settings, rate_hz: float = RATE_HZ, *, loop: bool = False) -> int:
     """Publish a walk on a running bus in real time; says how many messages. Raises NotReady when no bus answers."""
-    from foottrack_service.bus.connection import Bus
-
     bodies = list(stream_bodies(walk, rate_hz))
-    with Bus.connect(settings.bus) as bus:
+    async with joined(settings) as bus:
         publisher = bus.publisher(SOURCE)
         try:
             await publisher.ready()

@@ -13,6 +13,7 @@ from rich.live import Live
 from rich.table import Table
 
 from foottrack_service.bus.subscriber import Received, Subscriber
+from foottrack_service.cli.joining import joined
 from foottrack_service.cli.running import (
     CommandFailed,
     ConfigOption,
@@ -119,9 +120,7 @@ def rates_table(rows: dict[str, Row]) -> Table:
 
 
 async def _top(settings: Settings, seconds: float | None, as_json: bool) -> None:
-    from foottrack_service.bus.connection import Bus
-
-    with Bus.connect(settings.bus) as bus:
+    async with joined(settings) as bus:
         subscriber = bus.subscriber()
         await subscriber.ready()
         rates = StreamRates(subscriber)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bus_traffic import answering
 
 from foottrack_protocol.frames import STANDARD_GRAVITY
 from foottrack_protocol.messages import Imu, ImuCalibration
@@ -68,7 +69,8 @@ async def scenario(
 ) -> Any:
     playing = asyncio.create_task(wearer.run())
     try:
-        return await calibrate(Settings(bus=broker.endpoints), timeout_s, True, act)
+        async with answering(broker) as ends:
+            return await calibrate(Settings(bus=ends), timeout_s, True, act)
     finally:
         playing.cancel()
         await asyncio.gather(playing, return_exceptions=True)
@@ -119,9 +121,9 @@ def test_what_a_person_does_wrong_is_said(walking: bool, text: str, broker: Brok
         run(scenario(broker, bus, wearer, lambda text: None, timeout_s=1.0))
 
 
-def test_without_imus_it_says_so(broker: Broker, run: Any) -> None:
+def test_without_imus_it_says_so(broker: Broker, bus: Bus, run: Any) -> None:
     with pytest.raises(CommandFailed, match="no IMU is heard"):
-        run(calibrate(Settings(bus=broker.endpoints), 1.0, True, lambda text: None))
+        run(scenario(broker, bus, Wearer(bus, ()), lambda text: None, 1.0))
 
 
 def test_rest_is_found_after_a_movement_and_survives_stamps_that_go_back() -> None:

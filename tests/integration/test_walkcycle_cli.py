@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from bus_traffic import answering
 from typer.testing import CliRunner
 
 from foottrack_service.bus import Broker, Bus
@@ -130,22 +131,25 @@ def test_a_recording_holds_the_streams_of_a_person(tmp_path: Path) -> None:
 
 def test_a_walk_plays_on_a_running_bus(broker: Broker, context: Context, run: Any) -> None:
     walk = walk_along(build_cycle(preset("normative")), parse_path("line:0.8"), 1)
-    settings = Settings(bus=broker.endpoints)
 
     async def listen() -> tuple[int, list[str]]:
-        with Bus.connect(broker.endpoints, context) as bus:
-            subscriber = bus.subscriber(["user/"])
-            try:
-                await subscriber.ready()
-                playing = asyncio.create_task(walk_files.play_walk(walk, settings, 60.0))
-                heard: list[str] = []
-                async for batch in subscriber.batches():
-                    heard += [received.message.stream for received in batch]
-                    if playing.done() and len(heard) >= playing.result():
-                        break
-                return await playing, heard
-            finally:
-                subscriber.close()
+        async with answering(broker) as ends:
+            with Bus.connect(ends, context) as bus:
+                return await heard_by(bus, Settings(bus=ends))
+
+    async def heard_by(bus: Bus, settings: Settings) -> tuple[int, list[str]]:
+        subscriber = bus.subscriber(["user/"])
+        try:
+            await subscriber.ready()
+            playing = asyncio.create_task(walk_files.play_walk(walk, settings, 60.0))
+            heard: list[str] = []
+            async for batch in subscriber.batches():
+                heard += [received.message.stream for received in batch]
+                if playing.done() and len(heard) >= playing.result():
+                    break
+            return await playing, heard
+        finally:
+            subscriber.close()
 
     sent, heard = run(listen())
     assert sent == len(heard)
