@@ -16,7 +16,7 @@ import numpy as np
 
 from foottrack_service.fusion.compiled import compiled
 from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE, Stamps
-from foottrack_service.fusion.foot_filter_kernel import GRAVITY, rotation, turned
+from foottrack_service.fusion.foot_filter_kernel import GRAVITY, Vector, rotation, turned
 from foottrack_service.rotations import Array
 
 WINDOW_NS = 80_000_000
@@ -50,43 +50,41 @@ PEAK, STATISTIC, DOUBTED = 0, 1, 2
 
 
 @compiled
-def stillness(t: Stamps, rows: Array, i: int, mean: Array) -> float:
+def stillness(t: Stamps, rows: Array, i: int) -> tuple[float, Vector]:
     """The statistic over the window that ends at the IMU row i (0: as still as can be); inf before there is one.
 
-    Writes the mean specific force, m/s^2, into ``mean``, shape (3,).
+    And the mean specific force, m/s^2.
     Rates that are differences of a device's own attitude carry its corrections: they are averaged over half a window.
     """
-    n = 0
-    mean[:] = 0.0
-    halves = np.zeros((2, 3))
-    counts = np.zeros(2)
-    square, rate = 0.0, 0.0
+    f0 = f1 = f2 = square = 0.0
+    late0 = late1 = late2 = early0 = early1 = early2 = rate = 0.0
+    n, late = 0, 0
     j = i
     while j >= 0 and t[i] - t[j] <= WINDOW_NS:
         if rows[j, KIND] == IMU:
-            half = 0 if t[i] - t[j] < WINDOW_NS // 2 else 1
-            for k in range(3):
-                a, w = rows[j, ACC + k], rows[j, GYRO + k]
-                mean[k] += a
-                square += a * a
-                halves[half, k] += w
-                rate += w * w
-            counts[half] += 1.0
+            a0, a1, a2 = rows[j, ACC], rows[j, ACC + 1], rows[j, ACC + 2]
+            w0, w1, w2 = rows[j, GYRO], rows[j, GYRO + 1], rows[j, GYRO + 2]
+            f0, f1, f2 = f0 + a0, f1 + a1, f2 + a2
+            square += a0 * a0 + a1 * a1 + a2 * a2
+            rate += w0 * w0 + w1 * w1 + w2 * w2
+            if t[i] - t[j] < WINDOW_NS // 2:
+                late0, late1, late2 = late0 + w0, late1 + w1, late2 + w2
+                late += 1
+            else:
+                early0, early1, early2 = early0 + w0, early1 + w1, early2 + w2
             n += 1
         j -= 1
     if j < 0 or n < LEAST_SAMPLES:
-        return math.inf
-    mean /= n
-    norm2 = mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2]
+        return math.inf, (0.0, 0.0, 0.0)
+    f0, f1, f2 = f0 / n, f1 / n, f2 / n
+    norm2 = f0 * f0 + f1 * f1 + f2 * f2
     spread2 = max(0.0, square / n - norm2)
     off = math.sqrt(norm2) - GRAVITY
     if rows[i, MEAN_RATE] == 1.0:
-        rate = 0.0
-        for half in range(2):
-            if counts[half] > 0.0:
-                for k in range(3):
-                    rate += halves[half, k] ** 2 / counts[half]
-    return math.sqrt((spread2 + off * off) / FORCE_SPREAD**2 + rate / n / RATE**2)
+        rate = (late0 * late0 + late1 * late1 + late2 * late2) / late
+        if n > late:
+            rate += (early0 * early0 + early1 * early1 + early2 * early2) / (n - late)
+    return math.sqrt((spread2 + off * off) / FORCE_SPREAD**2 + rate / n / RATE**2), (f0, f1, f2)
 
 
 @compiled
@@ -96,8 +94,7 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
     ``dt``, s, since the last sample; ``x`` and ``P`` the filter before it; ``memory``, shape (3,), is carried from
     sample to sample.
     """
-    mean = np.empty(3)
-    statistic = stillness(t, rows, i, mean)
+    statistic, mean = stillness(t, rows, i)
     memory[STATISTIC] = statistic
     if not math.isfinite(statistic):
         return 0.0
@@ -106,12 +103,9 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
         memory[DOUBTED] = 0.0
         return 0.0
     # A smooth push sideways hardly changes |f|, but it shows against what the filter knows to be up.
-    R = np.empty((3, 3))
-    rotation(x[6:10], R)
-    a = turned(R, mean - x[10:13])
-    a[1] -= GRAVITY
+    a = turned(rotation(x[6:10]), (mean[0] - x[10], mean[1] - x[11], mean[2] - x[12]))
     tilt = math.sqrt(P[6, 6] + P[8, 8])
-    pushed = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    pushed = math.sqrt(a[0] * a[0] + (a[1] - GRAVITY) ** 2 + a[2] * a[2])
     if pushed > PUSH + PUSH_SHARE * statistic + 3.0 * GRAVITY * tilt:
         memory[DOUBTED] += dt
         if memory[DOUBTED] < DOUBT_S:

@@ -161,10 +161,10 @@ class InertialFilter:
         replay(timeline.t, timeline.rows, timeline.X, timeline.P, i, i + 1, self._geometry, self._smallest)
         x, P = timeline.X[i], timeline.P[i]
         ours = self._fix_rows.take_attitude(row, fix, attitudes, x)
-        found = judged(row, x, P, self._rate(i))
+        place, turned_by, residual = judged(row, x, P, self._rate(i))
         if math.sqrt(max(P[0, 0], P[1, 1], P[2, 2])) > UNSURE_SIGMA:
             self.acquired = False
-        good = ours and found[0] <= CHI_SQUARE_3 and found[1] <= CHI_SQUARE_1
+        good = ours and place <= CHI_SQUARE_3 and turned_by <= CHI_SQUARE_1
         if self.acquired and good:
             self._accept(i, t, fix.kind)
             return Verdict.ACCEPTED
@@ -175,7 +175,7 @@ class InertialFilter:
                 turn = float(attitude_error(row[MEASURED_Q : MEASURED_Q + 4], x)[1])
             sigma = math.sqrt(max(row[POINT_COV], row[POINT_COV + 4], row[POINT_COV + 8]))
             rejected = Rejected(
-                t, row[POINT : POINT + 3].copy(), found[2:5].copy(), turn, sigma, row[ARM : ARM + 3].copy()
+                t, row[POINT : POINT + 3].copy(), np.array(residual), turn, sigma, row[ARM : ARM + 3].copy()
             )
             agreed = self._candidates[fix.kind].add(rejected, self._sure_for(P, t, fix.kind))
             if agreed is not None:

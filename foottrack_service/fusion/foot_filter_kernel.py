@@ -21,6 +21,12 @@ NX = 17
 NE = 16
 GRAVITY = 9.80665
 
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+"""Rows. Compiled code keeps tuples in registers; a small array would be allocated each time."""
+Sequence3 = Array | Vector
+Sequence4 = Array | tuple[float, float, float, float]
+
 ACC_NOISE = 0.02
 """m/s^2/sqrt(Hz): a good sensor has 0.002; the rest is vibration and misalignment at rest."""
 ACC_SCALE = 0.004
@@ -46,38 +52,41 @@ DELAY_WALK = 0.0001
 
 
 @compiled
-def rotation(q: Array, R: Array) -> None:
-    """Write the matrix of q, shape (4,), into R, shape (3, 3)."""
+def rotation(q: Sequence4) -> Matrix:
+    """The matrix of q, shape (4,), as three rows."""
     x, y, z, w = q[0], q[1], q[2], q[3]
-    R[0, 0] = 1.0 - 2.0 * (y * y + z * z)
-    R[0, 1] = 2.0 * (x * y - z * w)
-    R[0, 2] = 2.0 * (x * z + y * w)
-    R[1, 0] = 2.0 * (x * y + z * w)
-    R[1, 1] = 1.0 - 2.0 * (x * x + z * z)
-    R[1, 2] = 2.0 * (y * z - x * w)
-    R[2, 0] = 2.0 * (x * z - y * w)
-    R[2, 1] = 2.0 * (y * z + x * w)
-    R[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
+        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
+        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
+    )
 
 
 @compiled
-def turned(R: Array, v: Array) -> Array:
-    """R v, shape (3,)."""
-    out = np.empty(3)
-    for i in range(3):
-        out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
-    return out
+def turned(R: Matrix, v: Sequence3) -> Vector:
+    """R v."""
+    return (
+        R[0][0] * v[0] + R[0][1] * v[1] + R[0][2] * v[2],
+        R[1][0] * v[0] + R[1][1] * v[1] + R[1][2] * v[2],
+        R[2][0] * v[0] + R[2][1] * v[1] + R[2][2] * v[2],
+    )
 
 
 @compiled
-def product(a: Array, b: Array) -> Array:
-    """Hamilton product of two quaternions, shape (4,): first b turns, then a."""
-    out = np.empty(4)
-    out[0] = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1]
-    out[1] = a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0]
-    out[2] = a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3]
-    out[3] = a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]
-    return out
+def cross(a: Sequence3, b: Sequence3) -> Vector:
+    """a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@compiled
+def product(a: Sequence4, b: Sequence4) -> tuple[float, float, float, float]:
+    """Hamilton product of two quaternions: first b turns, then a."""
+    return (
+        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
+        a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
+        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3],
+        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
+    )
 
 
 @compiled
@@ -106,23 +115,22 @@ def turn_stage(q: Array, rx: float, ry: float, rz: float) -> None:
 
 
 @compiled
-def propagate(x: Array, P: Array, acc: Array, gyro: Array, step: float, clipped: bool, fused: bool, dt: float) -> None:
+def propagate(
+    x: Array, P: Array, acc: Sequence3, gyro: Sequence3, step: float, clipped: bool, fused: bool, dt: float
+) -> None:
     """Carry x and P forward by dt, s, in place.
 
-    ``acc`` (m/s^2) and ``gyro`` (rad/s), shape (3,), are means over the interval, ``step`` (m/s^2) is how far the
-    specific force moved within it. ``fused``: the rate is the increment of the device's own attitude.
+    ``acc`` (m/s^2) and ``gyro`` (rad/s) are means over the interval, ``step`` (m/s^2) is how far the specific force
+    moved within it. ``fused``: the rate is the increment of the device's own attitude.
     """
     q = x[6:10]
-    fx, fy, fz = acc[0] - x[10], acc[1] - x[11], acc[2] - x[12]
+    f = (acc[0] - x[10], acc[1] - x[11], acc[2] - x[12])
     wx, wy, wz = gyro[0] - x[13], gyro[1] - x[14], gyro[2] - x[15]
     turn_body(q, 0.5 * dt * wx, 0.5 * dt * wy, 0.5 * dt * wz)
-    R = np.empty((3, 3))
-    rotation(q, R)
+    R = rotation(q)
     turn_body(q, 0.5 * dt * wx, 0.5 * dt * wy, 0.5 * dt * wz)
-    gx = R[0, 0] * fx + R[0, 1] * fy + R[0, 2] * fz
-    gy = R[1, 0] * fx + R[1, 1] * fy + R[1, 2] * fz
-    gz = R[2, 0] * fx + R[2, 1] * fy + R[2, 2] * fz
-    ax, ay, az = gx, gy - GRAVITY, gz
+    g = turned(R, f)
+    ax, ay, az = g[0], g[1] - GRAVITY, g[2]
     half = 0.5 * dt * dt
     x[0] += x[3] * dt + ax * half
     x[1] += x[4] * dt + ay * half
@@ -130,40 +138,11 @@ def propagate(x: Array, P: Array, acc: Array, gyro: Array, step: float, clipped:
     x[3] += ax * dt
     x[4] += ay * dt
     x[5] += az * dt
-
-    # da/dtheta = -[g]x, da/dba = -R, dtheta/dbg = -R dt
-    for j in range(NE):
-        t0, t1, t2 = P[6, j], P[7, j], P[8, j]
-        b0, b1, b2 = P[9, j], P[10, j], P[11, j]
-        a0 = gz * t1 - gy * t2 - (R[0, 0] * b0 + R[0, 1] * b1 + R[0, 2] * b2)
-        a1 = gx * t2 - gz * t0 - (R[1, 0] * b0 + R[1, 1] * b1 + R[1, 2] * b2)
-        a2 = gy * t0 - gx * t1 - (R[2, 0] * b0 + R[2, 1] * b1 + R[2, 2] * b2)
-        P[0, j] += dt * P[3, j] + half * a0
-        P[1, j] += dt * P[4, j] + half * a1
-        P[2, j] += dt * P[5, j] + half * a2
-        P[3, j] += dt * a0
-        P[4, j] += dt * a1
-        P[5, j] += dt * a2
-        w0, w1, w2 = P[12, j], P[13, j], P[14, j]
-        P[6, j] -= dt * (R[0, 0] * w0 + R[0, 1] * w1 + R[0, 2] * w2)
-        P[7, j] -= dt * (R[1, 0] * w0 + R[1, 1] * w1 + R[1, 2] * w2)
-        P[8, j] -= dt * (R[2, 0] * w0 + R[2, 1] * w1 + R[2, 2] * w2)
-    for i in range(NE):
-        t0, t1, t2 = P[i, 6], P[i, 7], P[i, 8]
-        b0, b1, b2 = P[i, 9], P[i, 10], P[i, 11]
-        a0 = gz * t1 - gy * t2 - (R[0, 0] * b0 + R[0, 1] * b1 + R[0, 2] * b2)
-        a1 = gx * t2 - gz * t0 - (R[1, 0] * b0 + R[1, 1] * b1 + R[1, 2] * b2)
-        a2 = gy * t0 - gx * t1 - (R[2, 0] * b0 + R[2, 1] * b1 + R[2, 2] * b2)
-        P[i, 0] += dt * P[i, 3] + half * a0
-        P[i, 1] += dt * P[i, 4] + half * a1
-        P[i, 2] += dt * P[i, 5] + half * a2
-        P[i, 3] += dt * a0
-        P[i, 4] += dt * a1
-        P[i, 5] += dt * a2
-        w0, w1, w2 = P[i, 12], P[i, 13], P[i, 14]
-        P[i, 6] -= dt * (R[0, 0] * w0 + R[0, 1] * w1 + R[0, 2] * w2)
-        P[i, 7] -= dt * (R[1, 0] * w0 + R[1, 1] * w1 + R[1, 2] * w2)
-        P[i, 8] -= dt * (R[2, 0] * w0 + R[2, 1] * w1 + R[2, 2] * w2)
+    # P is symmetric: F P F' = F (F P)'
+    rows = P.reshape(NE * NE)
+    _carry(rows, R, g, dt)
+    _transpose(rows)
+    _carry(rows, R, g, dt)
 
     felt = math.sqrt(ax * ax + ay * ay + az * az)
     rate = math.sqrt(wx * wx + wy * wy + wz * wz)
@@ -185,20 +164,22 @@ def propagate(x: Array, P: Array, acc: Array, gyro: Array, step: float, clipped:
 
 
 @compiled
-def invert3(S: Array, inverse: Array) -> bool:
-    """Inverse of a symmetric positive definite matrix, shape (3, 3); False where it is none."""
-    a, b, c, d, e, f = S[0, 0], S[0, 1], S[0, 2], S[1, 1], S[1, 2], S[2, 2]
+def invert3(S: Matrix) -> tuple[bool, Matrix]:
+    """Whether a symmetric matrix, of which only the upper half is read, is positive definite, and its inverse."""
+    (a, b, c), (_, d, e), (_, _, f) = S
     ca, cb, cc = d * f - e * e, c * e - b * f, b * e - c * d
     det = a * ca + b * cb + c * cc
     if not (a > 0.0 and a * d - b * b > 0.0 and det > 0.0):
-        return False
-    inverse[0, 0] = ca / det
-    inverse[0, 1] = inverse[1, 0] = cb / det
-    inverse[0, 2] = inverse[2, 0] = cc / det
-    inverse[1, 1] = (a * f - c * c) / det
-    inverse[1, 2] = inverse[2, 1] = (b * c - a * e) / det
-    inverse[2, 2] = (a * d - b * b) / det
-    return True
+        return False, S
+    ia, ib, ic, id_, ie, if_ = (
+        ca / det,
+        cb / det,
+        cc / det,
+        (a * f - c * c) / det,
+        (b * c - a * e) / det,
+        (a * d - b * b) / det,
+    )
+    return True, ((ia, ib, ic), (ib, id_, ie), (ic, ie, if_))
 
 
 @compiled
@@ -212,62 +193,73 @@ def inject(x: Array, d: Array) -> None:
 
 
 @compiled
-def update3(x: Array, P: Array, H: Array, innovation: Array, S_noise: Array, gate: float) -> float:
+def seen_through(P: Array, H: Array, noise: Array, PH: Array) -> Matrix:
+    """H P, shape (3, 16), into PH; returns the innovation's covariance H P H' + noise."""
+    S = noise.copy()
+    PH[:] = 0.0
+    for m in range(3):
+        for j in range(NE):
+            h = H[m, j]
+            if h != 0.0:
+                for i in range(NE):
+                    PH[m, i] += P[j, i] * h
+    for m in range(3):
+        for i in range(NE):
+            h = H[m, i]
+            if h != 0.0:
+                for n in range(m, 3):
+                    S[m, n] += h * PH[n, i]
+    return (S[0, 0], S[0, 1], S[0, 2]), (S[0, 1], S[1, 1], S[1, 2]), (S[0, 2], S[1, 2], S[2, 2])
+
+
+@compiled
+def update3(x: Array, P: Array, H: Array, innovation: Sequence3, noise: Array, gate: float) -> float:
     """Measurement of three components, H of shape (3, 16), its noise of shape (3, 3), in place.
 
     Returns the squared Mahalanobis distance; nothing is changed when that is above ``gate`` or is not finite.
     """
-    PH = np.zeros((NE, 3))
-    for j in range(NE):
-        for m in range(3):
-            h = H[m, j]
-            if h != 0.0:
-                for i in range(NE):
-                    PH[i, m] += P[i, j] * h
-    S = S_noise.copy()
-    for m in range(3):
-        for n in range(3):
-            for i in range(NE):
-                S[m, n] += H[m, i] * PH[i, n]
-    inverse = np.empty((3, 3))
-    if not invert3(S, inverse):
-        return math.inf
-    y = inverse @ innovation
-    distance = float(innovation[0] * y[0] + innovation[1] * y[1] + innovation[2] * y[2])
-    if not distance <= gate:
-        return distance if distance == distance else math.inf
-    d = PH @ y
-    K = PH @ inverse
-    for i in range(NE):
-        for j in range(i, NE):
-            change = K[i, 0] * PH[j, 0] + K[i, 1] * PH[j, 1] + K[i, 2] * PH[j, 2]
-            P[i, j] -= change
-            P[j, i] = P[i, j]
-    inject(x, d)
-    return distance
+    PH = np.empty((3, NE))
+    S = seen_through(P, H, noise, PH)
+    return _fuse3(x, P, PH, S, innovation, gate)
+
+
+@compiled
+def update_speed(x: Array, P: Array, variance: float, gate: float) -> float:
+    """The velocity is zero, with this variance per axis, (m/s)^2; else as ``update3``."""
+    PH = P[3:6].copy()
+    S = (
+        (PH[0, 3] + variance, PH[0, 4], PH[0, 5]),
+        (PH[1, 3], PH[1, 4] + variance, PH[1, 5]),
+        (PH[2, 3], PH[2, 4], PH[2, 5] + variance),
+    )
+    return _fuse3(x, P, PH, S, (-x[3], -x[4], -x[5]), gate)
 
 
 @compiled
 def update1(x: Array, P: Array, h: Array, innovation: float, noise: float, gate: float) -> float:
     """Measurement of one component, h of shape (16,), its variance ``noise``; else as ``update3``."""
     ph = np.zeros(NE)
+    S = noise
     for j in range(NE):
         if h[j] != 0.0:
             for i in range(NE):
-                ph[i] += P[i, j] * h[j]
-    S = noise
+                ph[i] += P[j, i] * h[j]
     for i in range(NE):
-        S += h[i] * ph[i]
+        if h[i] != 0.0:
+            S += h[i] * ph[i]
     if not S > 0.0:
         return math.inf
     distance = innovation * innovation / S
     if not distance <= gate:
         return distance if distance == distance else math.inf
     for i in range(NE):
+        k = ph[i] / S
         for j in range(i, NE):
-            P[i, j] -= ph[i] * ph[j] / S
-            P[j, i] = P[i, j]
-    inject(x, ph * (innovation / S))
+            P[i, j] -= k * ph[j]
+    _mirror(P.reshape(NE * NE))
+    for i in range(NE):
+        ph[i] *= innovation / S
+    inject(x, ph)
     return distance
 
 
@@ -277,3 +269,63 @@ def floor_covariance(P: Array, smallest: Array) -> None:
     for i in range(NE):
         if P[i, i] < smallest[i]:
             P[i, i] = smallest[i]
+
+
+@compiled
+def _fuse3(x: Array, P: Array, PH: Array, S: Matrix, innovation: Sequence3, gate: float) -> float:
+    found, inverse = invert3(S)
+    if not found:
+        return math.inf
+    y = turned(inverse, innovation)
+    distance = innovation[0] * y[0] + innovation[1] * y[1] + innovation[2] * y[2]
+    if not distance <= gate:
+        return distance if distance == distance else math.inf
+    d = np.empty(NE)
+    for i in range(NE):
+        column = (PH[0, i], PH[1, i], PH[2, i])
+        d[i] = column[0] * y[0] + column[1] * y[1] + column[2] * y[2]
+        k = turned(inverse, column)
+        for j in range(i, NE):
+            P[i, j] -= k[0] * PH[0, j] + k[1] * PH[1, j] + k[2] * PH[2, j]
+    _mirror(P.reshape(NE * NE))
+    inject(x, d)
+    return distance
+
+
+@compiled
+def _carry(p: Array, R: Matrix, g: Vector, dt: float) -> None:
+    """F P in place, p the rows of P in one line, shape (256,): so the compiler sees that they do not overlap."""
+    half = 0.5 * dt * dt
+    for j in range(NE):
+        v0, v1, v2 = p[48 + j], p[64 + j], p[80 + j]
+        t0, t1, t2 = p[96 + j], p[112 + j], p[128 + j]
+        b = turned(R, (p[144 + j], p[160 + j], p[176 + j]))
+        w = turned(R, (p[192 + j], p[208 + j], p[224 + j]))
+        # da/dtheta = -[g]x, da/dba = -R, dtheta/dbg = -R dt
+        a0 = g[2] * t1 - g[1] * t2 - b[0]
+        a1 = g[0] * t2 - g[2] * t0 - b[1]
+        a2 = g[1] * t0 - g[0] * t1 - b[2]
+        p[j] += dt * v0 + half * a0
+        p[16 + j] += dt * v1 + half * a1
+        p[32 + j] += dt * v2 + half * a2
+        p[48 + j] = v0 + dt * a0
+        p[64 + j] = v1 + dt * a1
+        p[80 + j] = v2 + dt * a2
+        p[96 + j] = t0 - dt * w[0]
+        p[112 + j] = t1 - dt * w[1]
+        p[128 + j] = t2 - dt * w[2]
+
+
+@compiled
+def _transpose(p: Array) -> None:
+    for i in range(1, NE):
+        for j in range(i):
+            p[NE * i + j], p[NE * j + i] = p[NE * j + i], p[NE * i + j]
+
+
+@compiled
+def _mirror(p: Array) -> None:
+    """What is above the diagonal goes below it."""
+    for i in range(1, NE):
+        for j in range(i):
+            p[NE * i + j] = p[NE * j + i]

@@ -18,7 +18,7 @@ from foottrack_service.fusion.foot_filter_events import (
     POINT_COV,
     TURN_SIGMA,
 )
-from foottrack_service.fusion.foot_filter_kernel import NE, invert3, product, rotation
+from foottrack_service.fusion.foot_filter_kernel import NE, Vector, invert3, rotation, seen_through, turned
 from foottrack_service.fusion.foot_filter_replay import attitude_error, point_model
 from foottrack_service.fusion.interface import OpticalFix, Verdict
 from foottrack_service.rotations import Array
@@ -95,8 +95,7 @@ class FixRows:
 
     def fill(self, row: Array, fix: OpticalFix, delay: float) -> list[Array]:
         """Write place and noise into ``row``; returns the sensor's attitudes that the tag allows, best first."""
-        matrix = np.empty((3, 3))
-        rotation(fix.head.q, matrix)
+        matrix = np.array(rotation(fix.head.q))
         row[POINT : POINT + 3] = fix.head.p + matrix @ fix.p
         distance2 = float(fix.p @ fix.p)
         noise = HEAD_NOISE**2 + HEAD_TURN_NOISE**2 * distance2
@@ -110,7 +109,7 @@ class FixRows:
         for q in (fix.q, fix.q_alt):
             norm = 0.0 if q is None else math.sqrt(float(q @ q))
             if q is not None and math.isfinite(norm) and norm > 0.0:
-                found.append(product(product(fix.head.q, q / norm), self._sensor_to_target))
+                found.append(rot.multiply(rot.multiply(fix.head.q, q / norm), self._sensor_to_target))
         return found
 
     def take_attitude(self, row: Array, fix: OpticalFix, attitudes: list[Array], x: Array) -> bool:
@@ -130,8 +129,7 @@ class FixRows:
         if leans[best] <= TILT_USABLE:
             q = attitudes[best]
             row[MEASURED_Q : MEASURED_Q + 4] = q
-            target = np.empty((3, 3))
-            rotation(product(q, self._target_to_sensor), target)
+            target = np.array(rotation(rot.multiply(q, self._target_to_sensor)))
             row[NORMAL : NORMAL + 3] = target[:, 2]
             across = math.sqrt(max(0.0, float(np.linalg.eigvalsh(fix.cov)[0])))
             row[TURN_SIGMA] = math.hypot(LEAST_TURN_SIGMA, TURN_PER_METRE * across)
@@ -139,22 +137,21 @@ class FixRows:
 
 
 @compiled
-def judged(row: Array, x: Array, P: Array, rate: Array) -> Array:
-    """A fix against the state at its instant.
-
-    Shape (5,): squared Mahalanobis distances of its place and of its turn, and the place's residual (3, m).
-    """
-    out = np.zeros(5)
-    h, H = np.empty(3), np.empty((3, NE))
+def judged(row: Array, x: Array, P: Array, rate: Array) -> tuple[float, float, Vector]:
+    """A fix against the state at its instant: squared Mahalanobis distances of place and of turn, residual (m)."""
+    h, H, PH = np.empty(3), np.empty((3, NE)), np.empty((3, NE))
     point_model(x, row[ARM : ARM + 3], rate, x[16] - row[PLACED_DELAY], h, H)
-    S = H @ P @ H.T + row[POINT_COV : POINT_COV + 9].copy().reshape(3, 3)
-    inverse = np.empty((3, 3))
-    residual = row[POINT : POINT + 3] - h
-    out[0] = residual @ inverse @ residual if invert3(S, inverse) else np.inf
-    out[2:5] = residual
+    found, inverse = invert3(seen_through(P, H, row[POINT_COV : POINT_COV + 9].reshape(3, 3), PH))
+    residual = (row[POINT] - h[0], row[POINT + 1] - h[1], row[POINT + 2] - h[2])
+    y = turned(inverse, residual)
+    place = residual[0] * y[0] + residual[1] * y[1] + residual[2] * y[2] if found else np.inf
+    turn = 0.0
     if row[TURN_SIGMA] > 0.0:
         error = attitude_error(row[MEASURED_Q : MEASURED_Q + 4], x)
-        n = row[NORMAL : NORMAL + 3].copy()
-        variance = n @ np.ascontiguousarray(P[6:9, 6:9]) @ n + row[TURN_SIGMA] ** 2
-        out[1] = (n @ error) ** 2 / variance
-    return out
+        variance, across = row[TURN_SIGMA] ** 2, 0.0
+        for i in range(3):
+            across += row[NORMAL + i] * error[i]
+            for j in range(3):
+                variance += row[NORMAL + i] * P[6 + i, 6 + j] * row[NORMAL + j]
+        turn = across * across / variance
+    return place, turn, residual

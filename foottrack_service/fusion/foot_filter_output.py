@@ -12,7 +12,7 @@ import numpy as np
 
 from foottrack_service.fusion.compiled import compiled
 from foottrack_service.fusion.foot_filter_events import ACC, CLIPPED, GYRO, ZERO_SIGMA
-from foottrack_service.fusion.foot_filter_kernel import GRAVITY, rotation, turn_body, turned
+from foottrack_service.fusion.foot_filter_kernel import GRAVITY, cross, rotation, turn_body, turned
 from foottrack_service.fusion.foot_filter_replay import ANKLE_ARM
 from foottrack_service.rotations import Array
 
@@ -40,16 +40,10 @@ RELEASE_S = 0.017
 @compiled
 def follow(lock: Array, row: Array, x: Array, toe_arm: Array, dt: float) -> None:
     """Carry the stance lock over one sample, dt in s. ``lock[OFFSET]`` is what the output is moved by."""
-    R = np.empty((3, 3))
-    rotation(x[6:10], R)
+    R = rotation(x[6:10])
     arm = turned(R, toe_arm)
-    spin = np.empty(3)
-    w0, w1, w2 = row[GYRO] - x[13], row[GYRO + 1] - x[14], row[GYRO + 2] - x[15]
-    spin[0] = w1 * toe_arm[2] - w2 * toe_arm[1]
-    spin[1] = w2 * toe_arm[0] - w0 * toe_arm[2]
-    spin[2] = w0 * toe_arm[1] - w1 * toe_arm[0]
-    speed = turned(R, spin)
-    toe = x[0:3] + arm
+    speed = turned(R, cross((row[GYRO] - x[13], row[GYRO + 1] - x[14], row[GYRO + 2] - x[15]), toe_arm))
+    toe = (x[0] + arm[0], x[1] + arm[1], x[2] + arm[2])
     s2 = 0.0
     gap2 = 0.0
     for k in range(3):
@@ -88,29 +82,17 @@ def predicted(row: Array, x: Array, P: Array, lock: Array, geometry: Array, dt: 
     q = x[6:10].copy()
     hold = min(max(dt, -LONGEST_HOLD_S), LONGEST_HOLD_S)
     clipped = row[CLIPPED] == 1.0
-    w = np.empty(3)
-    f = np.empty(3)
-    for k in range(3):
-        w[k] = row[GYRO + k] - x[13 + k]
-        f[k] = row[ACC + k] - x[10 + k]
-    R = np.empty((3, 3))
+    w = (row[GYRO] - x[13], row[GYRO + 1] - x[14], row[GYRO + 2] - x[15])
     turn_body(q, 0.5 * hold * w[0], 0.5 * hold * w[1], 0.5 * hold * w[2])
-    rotation(q, R)
-    a = turned(R, f)
-    a[1] -= GRAVITY
-    if clipped:
-        a[:] = 0.0
+    g = turned(rotation(q), (row[ACC] - x[10], row[ACC + 1] - x[11], row[ACC + 2] - x[12]))
+    a = (0.0, 0.0, 0.0) if clipped else (g[0], g[1] - GRAVITY, g[2])
     turn_body(q, 0.5 * hold * w[0], 0.5 * hold * w[1], 0.5 * hold * w[2])
-    rotation(q, R)
+    R = rotation(q)
     arm = geometry[ANKLE_ARM : ANKLE_ARM + 3]
     r = turned(R, arm)
     coast = dt - hold
     slow = math.exp(-max(coast, 0.0) / COASTING_DECAY_S)
-    spin = np.empty(3)
-    spin[0] = w[1] * arm[2] - w[2] * arm[1]
-    spin[1] = w[2] * arm[0] - w[0] * arm[2]
-    spin[2] = w[0] * arm[1] - w[1] * arm[0]
-    s = turned(R, spin)
+    s = turned(R, cross(w, arm))
     free = 0.5 * COASTING_ACCELERATION * coast * coast if coast > 0.0 else 0.0
     still = lock[CONTACT] == 1.0
     total = 3.0 * free * free * (0.01 if still else 1.0)

@@ -40,6 +40,10 @@ from foottrack_service.fusion.foot_filter_events import (
 from foottrack_service.fusion.foot_filter_kernel import (
     GRAVITY,
     NE,
+    Sequence3,
+    Sequence4,
+    Vector,
+    cross,
     floor_covariance,
     propagate,
     rotation,
@@ -47,6 +51,7 @@ from foottrack_service.fusion.foot_filter_kernel import (
     turned,
     update1,
     update3,
+    update_speed,
 )
 from foottrack_service.rotations import Array
 
@@ -106,19 +111,14 @@ def replay(t: Stamps, rows: Array, X: Array, P: Array, start: int, end: int, geo
 
 
 @compiled
-def point_model(x: Array, arm: Array, rate: Array, delay: float, h: Array, H: Array) -> None:
+def point_model(x: Array, arm: Array, rate: Sequence3, delay: float, h: Array, H: Array) -> None:
     """A point of the foot at ``arm``, sensor frame, m: its place into h (3,), the Jacobian into H (3, 16).
 
     ``rate`` is the sensor's turning, rad/s; ``delay`` how much later than the state the point was seen, s.
     """
-    R = np.empty((3, 3))
-    rotation(x[6:10], R)
+    R = rotation(x[6:10])
     r = turned(R, arm)
-    spin = np.empty(3)
-    spin[0] = rate[1] * arm[2] - rate[2] * arm[1]
-    spin[1] = rate[2] * arm[0] - rate[0] * arm[2]
-    spin[2] = rate[0] * arm[1] - rate[1] * arm[0]
-    s = turned(R, spin)
+    s = turned(R, cross(rate, arm))
     H[:] = 0.0
     for i in range(3):
         speed = x[3 + i] + s[i]
@@ -132,8 +132,8 @@ def point_model(x: Array, arm: Array, rate: Array, delay: float, h: Array, H: Ar
 
 
 @compiled
-def attitude_error(q: Array, x: Array) -> Array:
-    """The small turn in the stage from the state's attitude to q, rotation vector, rad, shape (3,)."""
+def attitude_error(q: Sequence4, x: Array) -> Vector:
+    """The small turn in the stage from the state's attitude to q, rotation vector, rad."""
     a, b = q, x[6:10]
     ex = -a[3] * b[0] + a[0] * b[3] - a[1] * b[2] + a[2] * b[1]
     ey = -a[3] * b[1] + a[0] * b[2] + a[1] * b[3] - a[2] * b[0]
@@ -143,18 +143,16 @@ def attitude_error(q: Array, x: Array) -> Array:
         ex, ey, ez, ew = -ex, -ey, -ez, -ew
     sine = math.sqrt(ex * ex + ey * ey + ez * ez)
     scale = 2.0 if sine < 1e-9 else 2.0 * math.atan2(sine, ew) / sine
-    out = np.empty(3)
-    out[0], out[1], out[2] = scale * ex, scale * ey, scale * ez
-    return out
+    return scale * ex, scale * ey, scale * ez
 
 
 @compiled
-def fix_updates(row: Array, x: Array, P: Array, rate: Array) -> None:
+def fix_updates(row: Array, x: Array, P: Array, rate: Vector) -> None:
     """An accepted fix: the target's place and, where it has one, its turn about the target's face."""
     h, H = np.empty(3), np.empty((3, NE))
     point_model(x, row[ARM : ARM + 3], rate, x[16] - row[PLACED_DELAY], h, H)
-    S = row[POINT_COV : POINT_COV + 9].copy().reshape(3, 3)
-    update3(x, P, H, row[POINT : POINT + 3] - h, S, np.inf)
+    noise = row[POINT_COV : POINT_COV + 9].reshape(3, 3)
+    update3(x, P, H, row[POINT : POINT + 3] - h, noise, np.inf)
     if row[TURN_SIGMA] > 0.0:
         error = attitude_error(row[MEASURED_Q : MEASURED_Q + 4], x)
         H1 = np.zeros(NE)
@@ -176,16 +174,14 @@ def _neighbour(rows: Array, i: int, step: int, end: int) -> int:
 
 
 @compiled
-def _rate(rows: Array, x: Array, i: int, end: int) -> Array:
+def _rate(rows: Array, x: Array, i: int, end: int) -> Vector:
     """The turning at event i, rad/s, sensor frame, of the IMU row next to it."""
     j = _neighbour(rows, i, 1, end)
     if j < 0:
         j = _neighbour(rows, i, -1, end)
-    rate = np.zeros(3)
-    if j >= 0:
-        for k in range(3):
-            rate[k] = rows[j, GYRO + k] - x[13 + k]
-    return rate
+    if j < 0:
+        return 0.0, 0.0, 0.0
+    return rows[j, GYRO] - x[13], rows[j, GYRO + 1] - x[14], rows[j, GYRO + 2] - x[15]
 
 
 @compiled
@@ -199,14 +195,12 @@ def _advance(t: Stamps, rows: Array, x: Array, P: Array, i: int, end: int, dt: f
         before = after
     if before < 0:
         return
-    acc, gyro = np.empty(3), np.empty(3)
-    step = 0.0
     held = after if rows[after, MEAN_RATE] == 1.0 else before
+    acc = _middle(rows[before, ACC : ACC + 3], rows[after, ACC : ACC + 3])
+    gyro = _middle(rows[held, GYRO : GYRO + 3], rows[after, GYRO : GYRO + 3])
+    step = 0.0
     for k in range(3):
-        a0, a1 = rows[before, ACC + k], rows[after, ACC + k]
-        acc[k] = 0.5 * (a0 + a1)
-        gyro[k] = 0.5 * (rows[held, GYRO + k] + rows[after, GYRO + k])
-        step += (a1 - a0) * (a1 - a0)
+        step += (rows[after, ACC + k] - rows[before, ACC + k]) ** 2
     fused = rows[after, MEAN_RATE] == 1.0
     if (t[after] - t[before]) * 1e-9 <= HOLE_S and dt <= HOLE_S:
         clipped = rows[before, CLIPPED] == 1.0 or rows[after, CLIPPED] == 1.0
@@ -216,12 +210,15 @@ def _advance(t: Stamps, rows: Array, x: Array, P: Array, i: int, end: int, dt: f
 
 
 @compiled
-def _coast(x: Array, P: Array, gyro: Array, fused: bool, dt: float) -> None:
+def _middle(a: Array, b: Array) -> Vector:
+    return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
+
+
+@compiled
+def _coast(x: Array, P: Array, gyro: Vector, fused: bool, dt: float) -> None:
     """Across a hole: the speed fades and wanders; a device with an attitude of its own still tells the turn."""
     if fused:
-        R = np.empty((3, 3))
-        rotation(x[6:10], R)
-        turn = turned(R, gyro)
+        turn = turned(rotation(x[6:10]), gyro)
         turn_stage(x[6:10], turn[0] * dt, turn[1] * dt, turn[2] * dt)
     fade = math.exp(-dt / HOLE_FADE_S)
     reach = HOLE_FADE_S * (1.0 - fade)
@@ -250,17 +247,9 @@ def _inertial_updates(row: Array, x: Array, P: Array, dt: float, geometry: Array
     h = np.zeros(NE)
     sigma = row[ZERO_SIGMA]
     if sigma > 0.0:
-        H = np.zeros((3, NE))
-        S = np.zeros((3, 3))
-        zero = np.empty(3)
-        for k in range(3):
-            H[k, 3 + k] = 1.0
-            S[k, k] = sigma * sigma * 0.01 / dt
-            zero[k] = -x[3 + k]
-        held = update3(x, P, H, zero, S, ZERO_GATE) <= ZERO_GATE
+        held = update_speed(x, P, sigma * sigma * 0.01 / dt, ZERO_GATE) <= ZERO_GATE
         if held and row[FLOOR] == row[FLOOR]:
-            R = np.empty((3, 3))
-            rotation(x[6:10], R)
+            R = rotation(x[6:10])
             up = turned(R, geometry[FOOT_UP : FOOT_UP + 3])
             if up[1] > FLOOR_LEAN:
                 r = turned(R, geometry[ANKLE_ARM : ANKLE_ARM + 3])
@@ -274,22 +263,20 @@ def _inertial_updates(row: Array, x: Array, P: Array, dt: float, geometry: Array
                 h[12 + k] = 1.0
                 update1(x, P, h, row[GYRO + k] - x[13 + k], BIAS_SIGMA**2 * 0.01 / dt, 9.0)
         if max(P[6, 6], P[8, 8]) > LEVEL_BELOW**2:
-            _level(row[ACC : ACC + 3] / GRAVITY, LEVEL_SIGMA**2 * 0.1 / dt, x, P)
+            up = (row[ACC] / GRAVITY, row[ACC + 1] / GRAVITY, row[ACC + 2] / GRAVITY)
+            _level(up, LEVEL_SIGMA**2 * 0.1 / dt, x, P)
     if row[UP] != 0.0 or row[UP + 1] != 0.0 or row[UP + 2] != 0.0:
-        _level(row[UP : UP + 3], UP_SIGMA**2 * UP_CORRELATED_S / dt, x, P)
+        _level((row[UP], row[UP + 1], row[UP + 2]), UP_SIGMA**2 * UP_CORRELATED_S / dt, x, P)
 
 
 @compiled
-def _level(up: Array, variance: float, x: Array, P: Array) -> None:
+def _level(up: Vector, variance: float, x: Array, P: Array) -> None:
     """``up``, sensor frame, is the stage's up: two components of the attitude error, never the yaw."""
-    R = np.empty((3, 3))
     h = np.zeros(NE)
-    rotation(x[6:10], R)
-    seen = turned(R, up)
+    seen = turned(rotation(x[6:10]), up)
     h[6] = 1.0
     update1(x, P, h, -seen[2], variance, np.inf)
-    rotation(x[6:10], R)
-    seen = turned(R, up)
+    seen = turned(rotation(x[6:10]), up)
     h[6], h[8] = 0.0, 1.0
     update1(x, P, h, seen[0], variance, np.inf)
 
@@ -303,9 +290,7 @@ def _reset(row: Array, x: Array, P: Array) -> None:
         y = -a[3] * b[1] + a[0] * b[2] + a[1] * b[3] - a[2] * b[0]
         w = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
         turn_stage(x[6:10], 0.0, 2.0 * math.atan2(y, w), 0.0)
-    R = np.empty((3, 3))
-    rotation(x[6:10], R)
-    r = turned(R, row[ARM : ARM + 3])
+    r = turned(rotation(x[6:10]), row[ARM : ARM + 3])
     for k in range(3):
         x[k] = row[POINT + k] - r[k]
         x[3 + k] = row[SPEED + k]
