@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+from typing import Annotated
 
 import typer
 
@@ -63,13 +64,20 @@ app.add_typer(walk.app, name="walk")
 app.add_typer(log.app, name="log", help="Look into recordings: info, cat, export, import, diff, recover.")
 
 
+@app.callback()
+def common(
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Say more of what is going on.")] = False,
+) -> None:
+    """What all commands have."""
+    running.set_up_logging(verbose)
+
+
 def main() -> None:
     """Entry point: errors that a person can mend are one line and an exit code, not a traceback."""
     # Messages are many small objects without cycles: looking for some after every 700 of them costs a replay 7 % and a
     # live pose its p99.
     gc.freeze()
     gc.set_threshold(50_000, 20, 50)
-    running.set_up_logging()
     try:
         app()
     except running.CommandFailed as error:

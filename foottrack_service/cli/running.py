@@ -77,8 +77,8 @@ def print_json(values: Any) -> None:
     typer.echo(json.dumps(_finite(values), indent=2 if sys.stdout.isatty() else None))
 
 
-def set_up_logging(verbose: bool = False) -> None:
-    """Log to standard error, through rich where a person reads it."""
+def set_up_logging(verbose: bool) -> None:
+    """Log to standard error, through rich where a person reads it: ours, and the libraries' warnings."""
     from rich.console import Console
     from rich.logging import RichHandler
 
@@ -89,7 +89,9 @@ def set_up_logging(verbose: bool = False) -> None:
     else:
         handler = logging.StreamHandler()
         handler.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
-    logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, handlers=[handler], force=True)
+    logging.basicConfig(level=logging.WARNING, handlers=[handler], force=True)
+    for ours in ("foottrack_service", "foottrack_protocol", "foottrack_client"):
+        logging.getLogger(ours).setLevel(logging.DEBUG if verbose else logging.INFO)
 
 
 def fail(text: str, code: int = EXIT_FAILED) -> NoReturn:

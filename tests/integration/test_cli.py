@@ -162,3 +162,9 @@ def test_doctor_says_what_is_wrong(tmp_path: Path) -> None:
     levels = {finding["subject"]: finding["level"] for finding in json.loads(done.stdout)["findings"]}
     assert levels["imu left"] == "error"
     assert levels["service"] == "error"
+
+
+def test_libraries_talk_only_to_warn(tmp_path: Path) -> None:
+    done = foottrack("markers", cwd=tmp_path)
+    assert done.stderr == ""
+    assert (tmp_path / "foottrack-markers.pdf").read_bytes().startswith(b"%PDF")
