@@ -153,6 +153,8 @@ class Service:
     async def _open(self) -> None:
         self._failure = asyncio.get_running_loop().create_future()
         self.bus = Bus.connect(self._broker.inproc, self._broker.context)
+        if self._broker.doorkeeper is not None:
+            self.bus.health.turned_away("door", self._broker.doorkeeper.refused)
         self._session = SessionInfo([self.settings.user], self.settings.digest)
         self._recorder = Recorder(self.bus, self.settings, self.settings.recording.folder)
         self._replays = ReplayDesk(self._broker.context)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import socket
+from collections import Counter
 
 from foottrack_protocol.envelope import Message
 from foottrack_protocol.topics import Policy
@@ -29,6 +30,7 @@ async def run(bus: Bus, settings: Settings) -> None:
     try:
         for name, target in settings.bridges.enabled.items():
             outputs.append(await _Output.open(name, _bridge(settings.bridges, name), target, target.port))
+            bus.health.turned_away(name, outputs[-1].drops)
         if not outputs:
             return
         subscriber = bus.subscriber([f"{settings.user}/pose/body"], Policy.LATEST)
@@ -44,7 +46,7 @@ async def run(bus: Bus, settings: Settings) -> None:
 
 
 class _Output:
-    """One bridge, its pace and its socket."""
+    """One bridge, its pace and its socket. ``drops`` counts datagrams that could not be sent."""
 
     def __init__(self, name: str, bridge: Bridge, pace: Pace, family: int, address: tuple[object, ...]) -> None:
         self._name = name
@@ -52,6 +54,7 @@ class _Output:
         self._pace = pace
         self._address = address
         self._trouble = ""
+        self.drops = Counter[str]()
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
 
@@ -81,6 +84,7 @@ class _Output:
                 self._socket.sendto(datagram, self._address)
             except OSError as error:
                 trouble = error.strerror or str(error)
+                self.drops["unsent"] += 1
         if trouble != self._trouble:
             self._trouble = trouble
             if trouble:

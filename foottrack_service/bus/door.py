@@ -11,6 +11,7 @@ import logging
 import threading
 import time
 import uuid
+from collections import Counter
 
 import zmq
 from zmq.utils import z85
@@ -21,6 +22,10 @@ from foottrack_service.bus.errors import BindFailed, BusError
 from foottrack_service.bus.security import load_keys
 from foottrack_service.config import BusSettings
 from foottrack_service.curve_settings import CurveClient, CurveSettings, Role
+
+REASONS = ("key", "role", "not_encrypted", "service_key", "protocol")
+"""Why somebody is not let in: his key is not on the list, or not for this role; he speaks in the clear; he means
+another service; he speaks something else."""
 
 _ZAP = "inproc://zeromq.zap.01"
 """Where libzmq asks whether a client may come in: https://rfc.zeromq.org/spec/27/."""
@@ -35,7 +40,8 @@ _log = logging.getLogger(__name__)
 class Doorkeeper:
     """Lets clients in by key and role. One for each context, which asks it through ZAP.
 
-    Start it, ``bind`` the sockets, close these, and then stop it. ``refused`` counts those who were not let in.
+    Start it, ``bind`` the sockets, close these, and then stop it. ``refused`` counts those who were not let in, by
+    reason: one of ``REASONS``.
     """
 
     def __init__(self, context: Context, settings: CurveSettings) -> None:
@@ -44,7 +50,8 @@ class Doorkeeper:
         assert settings.secret is not None
         ends = BusSettings.beginning_at(settings.listen)
         self.endpoints: dict[Role, str] = {"publish": ends.ingress, "subscribe": ends.egress, "control": ends.control}
-        self.refused = 0
+        # All reasons from the start: others read it while the thread counts.
+        self.refused = Counter(dict.fromkeys(REASONS, 0))
         self._context = context
         self._keys = load_keys(settings.secret)
         self._clients = {client.key: client for client in settings.clients}
@@ -124,7 +131,8 @@ class Doorkeeper:
         version, request, domain, address, _, _, key = frames[:7]
         client, refusal = self._judge(domain.decode(), z85.encode(key).decode() if len(key) == 32 else "")
         if refusal:
-            self._refuse(f"{address.decode(errors='replace')} was not let in to {domain.decode()}: {refusal}")
+            who = address.decode(errors="replace")
+            self._refuse("role" if client else "key", f"{who} was not let in to {domain.decode()}: {refusal}")
         verdict = (b"400", refusal.encode()) if refusal else (b"200", b"")
         self._zap.send_multipart([version, request, *verdict, client.name.encode() if client else b"", b""])
         return False
@@ -146,19 +154,20 @@ class Doorkeeper:
                 del self._monitors[monitor]
                 monitor.close(0)
             case zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL, zmq.PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH:
-                self._refuse(f"somebody without encryption was not let in to {role}: it needs keys, or a relay")
+                text = f"somebody without encryption was not let in to {role}: it needs keys, or a relay"
+                self._refuse("not_encrypted", text)
             case zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL, zmq.PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC:
-                self._refuse(
-                    f"somebody with another service's key was not let in to {role}: ours is {self._keys.public}"
-                )
+                text = f"somebody with another service's key was not let in to {role}: ours is {self._keys.public}"
+                self._refuse("service_key", text)
             case zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL, value:
-                self._refuse(f"somebody who does not speak ZMTP's CURVE was not let in to {role} ({value:#x})")
+                text = f"somebody who does not speak ZMTP's CURVE was not let in to {role} ({value:#x})"
+                self._refuse("protocol", text)
             case _:
                 # Connections that end during the handshake; plain ones at other listeners of the socket are among them.
                 _log.debug("a connection to %s ended during its handshake", role)
 
-    def _refuse(self, text: str) -> None:
-        self.refused += 1
+    def _refuse(self, reason: str, text: str) -> None:
+        self.refused[reason] += 1
         now = time.monotonic()
         if now - self._last_log >= _LOG_PERIOD_S:
             self._last_log = now

@@ -37,6 +37,7 @@ class HealthBoard:
         self._topics: dict[str, TopicHealth] = {}
         self._drops: dict[str, int] = {}
         self._refused: Counter[str] = Counter()
+        self._turned_away: dict[str, Mapping[str, int]] = {}
         self._latency: Latency | None = None
 
     def node(self, name: str, state: NodeState, error: str | None = None) -> None:
@@ -66,6 +67,10 @@ class HealthBoard:
         """Something was refused that names no topic: a control request."""
         self._refused[reason] += 1
 
+    def turned_away(self, name: str, counts: Mapping[str, int]) -> None:
+        """Who else counts what names no topic: its counters, which are read whenever health is told."""
+        self._turned_away[name] = counts
+
     def tick(self, t: int, stats: Stats) -> None:
         """Take what a monitor counted up to ``t`` (bus clock, ns); rates and latency are of the time since the last."""
         elapsed_s = 0.0 if self._ticked is None else (t - self._ticked) / 1e9
@@ -82,9 +87,17 @@ class HealthBoard:
             topics=self._topics,
             filters=self._filters,
             nodes=self._nodes,
-            drops={**self._drops, **self._refused},
+            drops={**self._drops, **self._refused, **self._at_doors()},
             latency_ms=self._latency,
         )
+
+    def _at_doors(self) -> dict[str, int]:
+        return {
+            f"{name}/{reason}": count
+            for name, counts in self._turned_away.items()
+            for reason, count in counts.items()
+            if count
+        }
 
     def _topic(self, name: str, stats: TopicStats, t: int, elapsed_s: float) -> TopicHealth:
         fresh = stats.messages - self._seen.get(name, 0)

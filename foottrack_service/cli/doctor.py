@@ -118,7 +118,8 @@ async def _streams(client: ControlClient, user: str) -> list[Finding]:
         level: Literal["ok", "warning"] = "warning" if slow or lost or drops else "ok"
         found.append(Finding(level, topic, f"{stats['hz']:.0f} Hz{lost}{drops}", advice))
     for reason, count in health["drops"].items():
-        what = "requests" if reason.startswith("control/") else "messages of no known topic"
+        kinds = {"control": "requests", "door": "connections"}
+        what = kinds.get(reason.partition("/")[0], "messages of no known topic")
         found.append(Finding("warning", "bus", f"{count} {what} refused: {reason}"))
     if f"{user}/head/pose" not in health["topics"]:
         found.append(

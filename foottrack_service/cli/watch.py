@@ -9,9 +9,11 @@ import time
 from typing import Annotated, NamedTuple
 
 import typer
+from rich.console import Group
 from rich.live import Live
 from rich.table import Table
 
+from foottrack_protocol.messages import Health
 from foottrack_service.bus.subscriber import Received, Subscriber
 from foottrack_service.cli.joining import joined
 from foottrack_service.cli.running import (
@@ -47,11 +49,14 @@ class StreamRates:
         self._recent: dict[str, list[tuple[int, int]]] = {}
         self._seen: dict[str, int] = {}
         self._first: dict[str, int] = {}
+        self.health: Health | None = None
 
     def add(self, batch: list[Received]) -> None:
-        """Count a batch."""
+        """Count a batch, and keep the last of ``sys/health``."""
         for received in batch:
             topic = received.message.topic
+            if isinstance(received.message.data, Health):
+                self.health = received.message.data
             self._recent.setdefault(topic, []).append((received.arrival, received.arrival - received.message.t_pub))
             self._seen[topic] = self._seen.get(topic, 0) + 1
             self._first.setdefault(topic, received.arrival)
@@ -81,7 +86,7 @@ def top(
     seconds: Annotated[float | None, typer.Option("--seconds", min=0.1, help="End after so long.")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """A live table of all streams: rate, gaps, age, latency.
+    """A live table of all streams: rate, gaps, age, latency; and what was dropped or refused, by whom and why.
 
     With --json, one snapshot after two seconds (or --seconds). Example: foottrack top
     """
@@ -106,6 +111,29 @@ def echo(
         run_loop(_echo(settings, topic, count, as_json))
 
 
+def drops_of(health: Health | None) -> dict[str, dict[str, int]]:
+    """What the service, its nodes and its filters let go, by who did and why; only what there is."""
+    if health is None:
+        return {}
+    counts = {topic: stats.drops for topic, stats in health.topics.items()}
+    counts |= {name: stats.rejected for name, stats in health.filters.items()}
+    for key, count in health.drops.items():
+        who, _, reason = key.rpartition("/")
+        counts.setdefault(who or "bus", {})[reason] = count
+    found = {who: {reason: count for reason, count in each.items() if count} for who, each in sorted(counts.items())}
+    return {who: each for who, each in found.items() if each}
+
+
+def drops_table(drops: dict[str, dict[str, int]]) -> Table:
+    """The table of ``drops_of``."""
+    table = Table(title="dropped and refused, since the service's start", title_justify="left")
+    table.add_column("who", no_wrap=True)
+    table.add_column("what, by reason")
+    for who, counts in drops.items():
+        table.add_row(who, ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items())))
+    return table
+
+
 def rates_table(rows: dict[str, Row]) -> Table:
     """The table of ``StreamRates.rows``."""
     table = Table(title="foottrack", title_justify="left")
@@ -127,13 +155,16 @@ async def _top(settings: Settings, seconds: float | None, as_json: bool) -> None
         end = None if seconds is None else time.monotonic() + seconds
         if as_json:
             await _collect(subscriber, rates, None, end)
-            print_json({"streams": {topic: row._asdict() for topic, row in rates.rows(bus.clock()).items()}})
+            streams = {topic: row._asdict() for topic, row in rates.rows(bus.clock()).items()}
+            print_json({"streams": streams, "drops": drops_of(rates.health)})
             return
         with Live(rates_table({}), refresh_per_second=4) as live:
             while end is None or time.monotonic() < end:
                 until = time.monotonic() + _REDRAW_S
                 await _collect(subscriber, rates, until, end)
-                live.update(rates_table(rates.rows(bus.clock())))
+                drops = drops_of(rates.health)
+                shown = [rates_table(rates.rows(bus.clock()))] + ([drops_table(drops)] if drops else [])
+                live.update(Group(*shown))
 
 
 async def _collect(subscriber: Subscriber, rates: StreamRates, until: float | None, end: float | None) -> None:

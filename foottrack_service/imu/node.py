@@ -52,6 +52,8 @@ class _Foot:
 
     def __init__(self, bus: Bus, user: str, side: Side, format_: str) -> None:
         self._user = user
+        self._board = bus.health
+        self._published = 0
         self._stream = f"imu/{side}"
         self._reported: Counter[str] = Counter()
         self.name = f"imu-{side}"
@@ -60,9 +62,11 @@ class _Foot:
 
     def publish(self, stamped: Stamped) -> None:
         self.publisher.publish(self._user, self._stream, stamped.t, stamped.imu)
+        self._published += 1
 
     def report(self, drops: Counter[str]) -> None:
-        """Say what was dropped since the last report."""
+        """Say what was dropped since the last report, in the log, and since the start, in ``sys/health``."""
+        self._board.filter(f"{self._user}/{self.name}", {"imu": self._published}, drops)
         fresh = drops - self._reported
         if fresh:
             text = ", ".join(f"{count} {reason}" for reason, count in sorted(fresh.items()))
@@ -145,6 +149,7 @@ async def _start_trackers(
     server = SlimeVrServer(None if turn is None else math.remainder(turn, 2.0 * math.pi))
     for foot in feet:
         await foot.publisher.ready()
+    bus.health.turned_away("slimevr", server.drops)
     imu = settings.imu
     socket = await SlimeVrSocket.open(
         imu.slimevr_host,

@@ -74,11 +74,13 @@ class Health(Body):
 
     topics: Annotated[dict[Str, TopicHealth], Field(max_length=MAX_ITEMS)] = Field(default={}, description="by topic")
     filters: Annotated[dict[Str, FilterHealth], Field(max_length=MAX_ITEMS)] = Field(
-        default={}, description="by `user/side`"
+        default={},
+        description="by `user/side`; of what a device gave, by `user/device`",
     )
     nodes: Annotated[dict[Str, NodeHealth], Field(max_length=MAX_ITEMS)] = Field(default={}, description="by name")
     drops: Counts = Field(
-        default={}, description="refused messages that name no topic, by reason; refused requests as `control/<code>`"
+        default={},
+        description="refused messages that name no topic, by reason; what else names none, as `who/reason`",
     )
     latency_ms: Latency | None = None
 

@@ -30,10 +30,14 @@ class Keyring:
         """How a client of that name connects to the encrypted endpoints; None: without encryption."""
         assert broker.doorkeeper is not None
         ends = broker.doorkeeper.endpoints
-        curve = CurveSettings()
-        if name is not None:
-            curve = CurveSettings(secret=self.folder / f"{name}.key_secret", service=service or self.service)
+        curve = self.key_settings(name, service)
         return BusSettings(ingress=ends["publish"], egress=ends["subscribe"], control=ends["control"], curve=curve)
+
+    def key_settings(self, name: str | None, service: str | None = None) -> CurveSettings:
+        """Of a client of that name."""
+        if name is None:
+            return CurveSettings()
+        return CurveSettings(secret=self.folder / f"{name}.key_secret", service=service or self.service)
 
 
 def three_free_ports() -> int:

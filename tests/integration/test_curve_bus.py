@@ -14,14 +14,17 @@ import pytest
 from bus_traffic import publish, take
 from curve_keys import Keyring
 
+from foottrack_service.app import Service
 from foottrack_service.bus import BindFailed, Broker, Bus, ControlServer, ControlTimeout, NotReady
 from foottrack_service.bus.door import Doorkeeper
 from foottrack_service.bus.endpoints import Context
 from foottrack_service.bus.security import new_keys
-from foottrack_service.config import BusSettings
+from foottrack_service.cli.watch import drops_of
+from foottrack_service.config import BusSettings, Settings
 
 Run = Callable[..., Any]
 SOON_S = 0.4
+ENDS = {"ingress": "publish", "egress": "subscribe", "control": "control"}
 
 
 @pytest.fixture
@@ -43,7 +46,7 @@ def door(keyring: Keyring, context: Context) -> Iterator[Broker]:
 def refused(broker: Broker) -> int:
     """How many were refused so far."""
     assert broker.doorkeeper is not None
-    return broker.doorkeeper.refused
+    return broker.doorkeeper.refused.total()
 
 
 def test_encrypted_and_plain_parties_share_one_bus(run: Run, keyring: Keyring, door: Broker, context: Context) -> None:
@@ -99,6 +102,29 @@ def test_who_may_not_is_refused_with_the_reason(
             end.wait_ready(SOON_S)
         assert end.connections == 0
     assert refused(door) > 0
+
+
+def test_who_is_not_let_in_is_counted_in_the_health_by_the_reason(run: Run, keyring: Keyring, context: Context) -> None:
+    new_keys(keyring.folder, "stranger")
+
+    async def scenario() -> None:
+        async with Service(Settings(bus=keyring.settings)) as service:
+            await service.bus.subscriber().ready()
+            doors = BusSettings(
+                **{end: service.encrypted_endpoints[role] for end, role in ENDS.items()}  # type: ignore[index]
+            )
+            due = {"door/key": "stranger", "door/role": "sensor", "door/not_encrypted": None}
+            for reason, name in due.items():
+                curve = keyring.key_settings(name)
+                with Bus.connect(doors.model_copy(update={"curve": curve}), context) as bus:
+                    bus.subscriber()
+                    while not service.bus.health.body().drops.get(reason):  # noqa: ASYNC110 - nothing says when
+                        await asyncio.sleep(0.01)
+            drops = service.bus.health.body().drops
+            assert {key for key in drops if key.startswith("door/")} == set(due)
+            assert drops_of(service.bus.health.body())["door"].keys() == {"key", "role", "not_encrypted"}
+
+    run(scenario())
 
 
 def test_a_role_that_is_named_is_given(keyring: Keyring, door: Broker, context: Context) -> None:

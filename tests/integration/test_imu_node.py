@@ -121,6 +121,30 @@ def test_one_foot_unplugged_does_not_disturb_the_other(tmp_path: Path, bus: Bus,
     run(scenario())
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no ptys")
+def test_what_a_device_sends_and_nobody_can_use_is_in_the_health(tmp_path: Path, bus: Bus, run: Any) -> None:
+    def counts() -> tuple[dict[str, int], dict[str, int]]:
+        found = bus.health.body().filters.get("user/imu-left")
+        return ({}, {}) if found is None else (found.accepted, found.rejected)
+
+    async def scenario() -> None:
+        wearer = Wearer(tmp_path / "left", "rvc")
+        wearer.plug()
+        settings = Settings(imu={"left": {"format": "rvc", "port": str(tmp_path / "left")}})
+        listener = Listener(bus)
+        await listener.subscriber.ready()
+        tasks = [asyncio.create_task(node.run(bus, settings)), asyncio.create_task(wearer.run())]
+        await listener.until(lambda: listener.count("left") >= 20)
+        # A packet whose sum is wrong.
+        wearer.say(b"\xaa\xaa" + bytes(16) + b"\x01")
+        await listener.until(lambda: counts()[1].get("checksum") == 1)
+        assert counts()[0]["imu"] >= 20
+        await stopped(*tasks)
+        wearer.unplug()
+
+    run(scenario())
+
+
 def _state(bus: Bus, name: str) -> str | None:
     health = bus.health.body().nodes.get(name)
     return None if health is None else health.state

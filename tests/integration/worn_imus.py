@@ -44,6 +44,11 @@ class Wearer:
             self._imu.close()
         self._imu = None
 
+    def say(self, data: bytes) -> None:
+        """Bytes as they are, between two packets."""
+        assert self._imu is not None
+        self._imu._pty.write(data)
+
     async def run(self) -> None:
         start = now()
         while True:
