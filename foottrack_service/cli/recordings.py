@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -50,10 +51,8 @@ def record(
     Examples: foottrack record walk.mcap --seconds 60; foottrack record trouble.mcap --raw
     """
     settings = settings_for(config, None, connect)
-    try:
+    with contextlib.suppress(KeyboardInterrupt):
         run_loop(_record(settings, file, seconds, raw))
-    except KeyboardInterrupt:
-        typer.echo(f"Closed {file}.", err=True)
 
 
 def replay(
@@ -110,10 +109,10 @@ async def _record(settings: Settings, file: Path, seconds: float | None, raw: bo
             shown.cancel()
             task.cancel()
             await asyncio.wait({task, shown})
-        if task.cancelled() or task.exception() is None:
-            stats = started.result().stats
-            typer.echo(f"Wrote {file}: {stats.written} messages, {stats.dropped} dropped.", err=True)
-        else:
+            if started.done() and (task.cancelled() or task.exception() is None):
+                stats = started.result().stats
+                typer.echo(f"Wrote {file}: {stats.written} messages, {stats.dropped} dropped.", err=True)
+        if not task.cancelled():
             task.result()
 
 

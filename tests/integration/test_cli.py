@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
 import subprocess
@@ -111,6 +112,26 @@ def test_ctrl_c_closes_a_demo_s_recording(tmp_path: Path) -> None:
     assert "Stopped early" in err
     assert "Recorded to cut.mcap" in out
     assert (tmp_path / "cut.mcap").exists()
+    foottrack("log", "info", "cut.mcap", cwd=tmp_path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals to other processes are POSIX's")
+def test_ctrl_c_closes_a_recording_and_says_what_is_in_it(tmp_path: Path) -> None:
+    with running(tmp_path) as (_, said):
+        ports = dict(zip(("INGRESS", "EGRESS", "CONTROL"), re.findall(r"tcp://[\d.:]+", said), strict=True))
+        process = subprocess.Popen(
+            [*FOOTTRACK, "record", "cut.mcap"],
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=tmp_path,
+            env=os.environ | {f"FOOTTRACK_BUS__{name}": address for name, address in ports.items()},
+        )
+        while not list(tmp_path.glob("cut.mcap*")):
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=20)
+    assert process.returncode == 0, err
+    assert re.fullmatch(r"Wrote cut\.mcap: \d+ messages, 0 dropped\.\n", err)
     foottrack("log", "info", "cut.mcap", cwd=tmp_path)
 
 
