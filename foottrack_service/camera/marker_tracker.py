@@ -136,7 +136,7 @@ class MarkerTracker:
             return 0.0
         (x, y, z), (vx, vy, vz) = track.p.tolist(), track.v.tolist()
         across = math.hypot(vx - vz * x / z, vy - vz * y / z)
-        return across * frame.exposure * self._rig.intrinsics.focal / z
+        return float(across * frame.exposure * self._rig.intrinsics.focal / z)
 
     def _follow(self, target: Target, t: int, p: Array) -> None:
         before = self._tracks.get(target.side)

@@ -94,7 +94,7 @@ def join_depth(
 def _area(corners: Array) -> float:
     """Of a quadrilateral (4, 2): half the product of its crossed diagonals."""
     (ax, ay), (bx, by), (cx, cy), (dx, dy) = corners.tolist()
-    return 0.5 * abs((cx - ax) * (dy - by) - (cy - ay) * (dx - bx))
+    return float(0.5 * abs((cx - ax) * (dy - by) - (cy - ay) * (dx - bx)))
 
 
 def _spots() -> Array:
