@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
@@ -94,10 +94,11 @@ class GodotProject:
 
 
 class GodotRun:
-    """A running Godot and the lines of JSON that it says."""
+    """A running Godot, or another client, and the lines of JSON that it says."""
 
-    def __init__(self, command: Sequence[str]) -> None:
-        self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    def __init__(self, command: Sequence[str], environment: Mapping[str, str] | None = None) -> None:
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, env=environment)
         self._lines: queue.Queue[dict[str, Any] | None] = queue.Queue()
         self._said: list[str] = []
         self._readers = [threading.Thread(target=work, daemon=True) for work in (self._listen, self._complain)]
@@ -111,9 +112,15 @@ class GodotRun:
                 line = self._lines.get(timeout=TIMEOUT_S)
             except queue.Empty:
                 line = None
-            assert line is not None, f"Godot did not say {kind} {values}:\n" + "\n".join(self._said)
+            assert line is not None, f"the client did not say {kind} {values}:\n" + "\n".join(self._said)
             if line["kind"] == kind and all(line.get(key) == value for key, value in values.items()):
                 return line
+
+    def tell(self, line: str) -> None:
+        """A line on its standard input."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(line + "\n")
+        self._process.stdin.flush()
 
     def memory_kb(self) -> int:
         """Resident memory of the process."""
@@ -130,7 +137,7 @@ class GodotRun:
         self._process.wait()
         for reader in self._readers:
             reader.join()
-        for pipe in (self._process.stdout, self._process.stderr):
+        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
             if pipe is not None:
                 pipe.close()
         errors = [line for line in self._said if "SCRIPT ERROR" in line]

@@ -64,7 +64,11 @@ class UnityPackage:
 
     def play(self, endpoints: Endpoints, follow: str = "Tracked") -> GodotRun:
         """A game that talks while it runs."""
-        return GodotRun(["mono", "--debug", str(self._program), "game", *ports_of(endpoints), follow])
+        return GodotRun(self.play_command(endpoints, follow))
+
+    def play_command(self, endpoints: Endpoints, follow: str = "Tracked") -> list[str]:
+        """What runs that game."""
+        return ["mono", "--debug", str(self._program), "game", *ports_of(endpoints), follow]
 
     def bench(self, endpoints: Endpoints, manner: str) -> GodotRun:
         """A game that measures, and says nothing ("quiet") or its counters ("talk") until it ends."""
