@@ -26,6 +26,9 @@ MAX_DEPTH = 12
 
 _KEYS = 8
 """Of the envelope, as far as this version knows them."""
+_EXTENSION = object()
+_NUMBER_FAULTS = {"finite_number", "int_type"}
+"""Pydantic's names for a NaN where a float or an integer is due."""
 _TOO_DEEP = f"more than {MAX_DEPTH} levels"
 
 
@@ -177,7 +180,7 @@ def _unpack(payload: bytes, topic: str | None) -> dict[Any, Any]:
     if len(payload) > MAX_PAYLOAD_BYTES:
         raise DecodeError(Reason.OVERSIZED, _too_large(payload), topic)
     try:
-        value = msgpack.unpackb(payload, max_array_len=MAX_ITEMS, max_map_len=MAX_ITEMS)
+        value = msgpack.unpackb(payload, max_array_len=MAX_ITEMS, max_map_len=MAX_ITEMS, ext_hook=_extension)
     except (msgpack.StackError, RecursionError):
         raise DecodeError(Reason.DEPTH, _TOO_DEEP, topic) from None
     except Exception as error:  # msgpack raises a dozen kinds; whatever it was, these bytes are no message
@@ -185,6 +188,11 @@ def _unpack(payload: bytes, topic: str | None) -> dict[Any, Any]:
     if type(value) is not dict:
         raise DecodeError(Reason.ENVELOPE, f"a map is due, not {type(value).__name__}", topic)
     return value
+
+
+def _extension(_code: int, _data: bytes) -> object:
+    """Means nothing on this wire. Msgpack's own ExtType refuses the codes below 0."""
+    return _EXTENSION
 
 
 def _read_body_among_unknown_keys(envelope: dict[Any, Any], user: str, entry: Topic) -> Any:
@@ -225,5 +233,5 @@ def _body_error(error: ValidationError, topic: str) -> DecodeError:
     first = error.errors(include_url=False, include_context=False)[0]
     place = ".".join(str(part) for part in first["loc"]) or "data"
     given = first["input"]
-    not_finite = type(given) is float and not math.isfinite(given)
+    not_finite = type(given) is float and not math.isfinite(given) and first["type"] in _NUMBER_FAULTS
     return DecodeError(Reason.NOT_FINITE if not_finite else Reason.BODY, f"{place}: {first['msg']}", topic)

@@ -36,10 +36,10 @@ REASON_MEANINGS: dict[Reason, str] = {
     Reason.OVERSIZED: "the payload is too large",
     Reason.MSGPACK: "the payload is not one msgpack value within the limits, with strings that are UTF-8",
     Reason.DEPTH: "arrays and maps too deep inside one another",
-    Reason.ENVELOPE: "the payload is no map, or a key of the envelope is missing or of a wrong type",
+    Reason.ENVELOPE: "the payload is no map, or a key of the envelope is missing or, `data` apart, of a wrong type",
     Reason.VERSION: "another protocol major",
-    Reason.NOT_FINITE: "a NaN or an infinity where a number is due",
-    Reason.BODY: "the body is not what its topic promises",
+    Reason.NOT_FINITE: "a NaN or an infinity where the body has a number",
+    Reason.BODY: "`data` is no map, or not the body that its topic promises",
 }
 
 

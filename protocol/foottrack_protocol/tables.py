@@ -107,10 +107,10 @@ def limits() -> str:
         ("payload", f"{MAX_PAYLOAD_BYTES} bytes"),
         ("levels of arrays and maps, the envelope being the first", f"{MAX_DEPTH}"),
         ("elements of one array, pairs of one map", f"{MAX_ITEMS}"),
-        ("integers that mean something", "-2^63 to 2^63 - 1"),
+        ("integers where an integer is due", "-2^63 to 2^63 - 1"),
         ("length of a quaternion or a direction", f"1 within {UNIT_TOLERANCE:g}"),
         (
-            "principal minors of a covariance whose largest element is scaled to 1",
+            "principal minors of a covariance whose largest absolute value is scaled to 1",
             f"at least -{SEMIDEFINITE_TOLERANCE:g}",
         ),
     )

@@ -56,6 +56,10 @@ def outcome(frames: list[bytes] | tuple[bytes, ...]) -> Message | Reason:
     return message
 
 
+def nothing(_code: int, _data: bytes) -> None:
+    """For an extension: msgpack's own ExtType is none with a code below 0."""
+
+
 def leaves(value: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], Any]]:
     """All values that are neither map nor array, each with its keys and indices."""
     if isinstance(value, dict | list):
@@ -111,7 +115,7 @@ def test_random_values_as_body(topic: bytes, value: Any) -> None:
 @given(st.data())
 def test_one_value_replaced(data: st.DataObject) -> None:
     golden = data.draw(st.sampled_from(GOLDEN))
-    envelope = msgpack.unpackb(golden.payload, strict_map_key=False)
+    envelope = msgpack.unpackb(golden.payload, strict_map_key=False, ext_hook=nothing)
     assume("data" in envelope)
     path = data.draw(st.sampled_from(list(paths(envelope))))
     outcome((golden.frames[0], msgpack.packb(changed(envelope, path, data.draw(anything(4))))))
@@ -152,7 +156,7 @@ def test_bits_flipped(golden: Any, places: list[int]) -> None:
 @given(st.integers().filter(lambda v: v != 1), st.sampled_from(GOLDEN))
 def test_another_major(version: int, golden: Any) -> None:
     assume(-(2**63) <= version < 2**64)
-    envelope = {**msgpack.unpackb(golden.payload), "v": version}
+    envelope = {**msgpack.unpackb(golden.payload, ext_hook=nothing), "v": version}
     assert outcome((golden.frames[0], msgpack.packb(envelope))) is Reason.VERSION
 
 

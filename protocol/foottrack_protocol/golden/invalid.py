@@ -166,6 +166,9 @@ def _numbers() -> Iterator[Refused]:
         ):
             place = next(iter(keys))
             yield Refused(f"{name} in {stream} {place}", _body(stream, **keys), Reason.NOT_FINITE)
+        yield Refused(f"{name} for an array", _body("imu/left", acc=number), Reason.BODY)
+        yield Refused(f"{name} for a string", _body("gait/event", event=number), Reason.BODY)
+        yield Refused(f"{name} for a body", (_TOPIC, _with(data=number)), Reason.BODY)
     hollow = _pack({**_WHOLE, "data": {**_IMU, "acc": []}})
     for name, raw in {
         "NaN of 32 bits": b"\xca\x7f\xc0\x00\x00",

@@ -62,7 +62,7 @@ def of_envelope() -> list[Golden]:
     }
     full = {**ENVELOPE, "data": body}
     bytes_key: dict[Any, Any] = {**full, b"v": 2}
-    deep = msgpack.packb({**full, "later": 0})[:-1] + nested_arrays(MAX_DEPTH - 1)
+    later = msgpack.packb({**full, "later": 0})[:-1]
     large = msgpack.packb({**full, "later": b""})[:-2]
     room = MAX_PAYLOAD_BYTES - len(large) - 5
     singles = msgpack.packb({**full, "data": pose}, use_single_float=True)
@@ -77,9 +77,10 @@ def of_envelope() -> list[Golden]:
             "user/head/pose",
             _packed({**head, "moved": {**head["moved"], **everything}}),
         ),
+        Golden("an extension of a type that msgpack keeps for itself", topic, later + b"\xd4\x80\x00"),
         Golden("a key that is bytes", topic, msgpack.packb(bytes_key)),
         Golden("keys in reverse order", topic, msgpack.packb(dict(reversed(full.items())))),
-        Golden("as deep as may be", topic, deep),
+        Golden("as deep as may be", topic, later + nested_arrays(MAX_DEPTH - 1)),
         Golden("as large as may be", topic, large + b"\xc6" + room.to_bytes(4, "big"), room),
         Golden("every value in its longest form", topic, widest(full)),
         Golden("every value in its longest form, nested", "user/pose/body", widest({**ENVELOPE, "data": pose})),

@@ -18,7 +18,12 @@ class Reading:
 	var fault := ""
 	var place := ""
 
-	func refuse(value: Variant) -> Variant:
+	func refuse() -> Variant:
+		fault = BODY
+		return null
+
+	## What stands where a number is due.
+	func refuse_number(value: Variant) -> Variant:
 		fault = NOT_FINITE if value is float and not is_finite(value) else BODY
 		return null
 
@@ -48,7 +53,7 @@ class Number:
 		elif value is Foreign:
 			number = value.number
 		if not is_finite(number) or number < _least or number > _most:
-			return reading.refuse(value)
+			return reading.refuse_number(value)
 		return number
 
 
@@ -63,7 +68,7 @@ class Integer:
 
 	func read(value: Variant, reading: Reading) -> Variant:
 		if not value is int or value < _least or value > _most:
-			return reading.refuse(value)
+			return reading.refuse_number(value)
 		return value
 
 
@@ -76,7 +81,7 @@ class OfType:
 		_type = type
 
 	func read(value: Variant, reading: Reading) -> Variant:
-		return value if typeof(value) == _type else reading.refuse(value)
+		return value if typeof(value) == _type else reading.refuse()
 
 
 class OneOf:
@@ -87,7 +92,7 @@ class OneOf:
 		_values = values
 
 	func read(value: Variant, reading: Reading) -> Variant:
-		return value if value is String and _values.has(value) else reading.refuse(value)
+		return value if value is String and _values.has(value) else reading.refuse()
 
 
 class Matching:
@@ -98,7 +103,7 @@ class Matching:
 		_pattern = RegEx.create_from_string(pattern)
 
 	func read(value: Variant, reading: Reading) -> Variant:
-		return value if value is String and _pattern.search(value) != null else reading.refuse(value)
+		return value if value is String and _pattern.search(value) != null else reading.refuse()
 
 
 ## So many numbers, as a PackedFloat64Array.
@@ -113,22 +118,22 @@ class Floats:
 
 	func read(value: Variant, reading: Reading) -> Variant:
 		if not value is Array or value.size() != _count:
-			return reading.refuse(value)
+			return reading.refuse()
 		var numbers := PackedFloat64Array()
 		numbers.resize(_count)
 		for i in _count:
 			var item: Variant = value[i]
 			if not item is float:
 				if not item is int and not item is Foreign:
-					return reading.refuse(item)
+					return reading.refuse_number(item)
 				item = float(item) if item is int else item.number
 			if not is_finite(item):
-				return reading.refuse(item)
+				return reading.refuse_number(item)
 			numbers[i] = item
 		if _shape == Shape.UNIT and not _normalise(numbers):
-			return reading.refuse(value)
+			return reading.refuse()
 		if _shape == Shape.COVARIANCE and not _semidefinite(numbers):
-			return reading.refuse(value)
+			return reading.refuse()
 		return numbers
 
 	static func _normalise(numbers: PackedFloat64Array) -> bool:
@@ -187,7 +192,7 @@ class Fields:
 
 	func read(value: Variant, reading: Reading) -> Variant:
 		if not value is Dictionary:
-			return reading.refuse(value)
+			return reading.refuse()
 		var given: Dictionary = value
 		var made := {}
 		for i in _names.size():
@@ -202,7 +207,7 @@ class Fields:
 				reading.place = name if reading.place.is_empty() else name + "." + reading.place
 				return null
 		if _rule.is_valid() and not _rule.call(made):
-			return reading.refuse(value)
+			return reading.refuse()
 		return made
 
 
@@ -216,10 +221,10 @@ class MapOf:
 
 	func read(value: Variant, reading: Reading) -> Variant:
 		if not value is Dictionary:
-			return reading.refuse(value)
+			return reading.refuse()
 		var made := {}
 		for key: Variant in value:
-			made[key] = _item.read(value[key], reading) if key is String else reading.refuse(key)
+			made[key] = _item.read(value[key], reading) if key is String else reading.refuse()
 			if not reading.fault.is_empty():
 				reading.place = str(key) if reading.place.is_empty() else str(key) + "." + reading.place
 				return null
@@ -235,7 +240,7 @@ class ListOf:
 
 	func read(value: Variant, reading: Reading) -> Variant:
 		if not value is Array:
-			return reading.refuse(value)
+			return reading.refuse()
 		var made := []
 		for item: Variant in value:
 			made.append(_item.read(item, reading))
@@ -254,11 +259,11 @@ class ByKind:
 
 	func read(value: Variant, reading: Reading) -> Variant:
 		if not value is Dictionary:
-			return reading.refuse(value)
+			return reading.refuse()
 		var kind: Variant = value.get("kind")
 		if not kind is String or not _checks.has(kind):
 			reading.place = "kind"
-			return reading.refuse(kind)
+			return reading.refuse()
 		var check: Check = _checks[kind]
 		return check.read(value, reading)
 
