@@ -70,13 +70,14 @@ class Peer:
         while self.read(4096):
             pass
 
-    def shake_hands(self, socket_type: bytes) -> None:
-        """Greeting and READY."""
+    def shake_hands(self, socket_type: bytes) -> bytes:
+        """Greeting and READY. Says the client's socket type."""
         self.send(greeting())
         assert self.read(64)[:1] == b"\xff"
         self.send(ready(socket_type))
         flags, content = self.read_frame()
-        assert flags == COMMAND and content.startswith(b"\x05READY")
+        assert flags == COMMAND and content.startswith(b"\x05READY\x0bSocket-Type")
+        return content[22:]
 
     def welcome(self) -> set[bytes]:
         """What the egress does until a subscriber is live. Says what it has subscribed to."""

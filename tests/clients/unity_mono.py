@@ -70,6 +70,12 @@ class UnityPackage:
         """What runs that game."""
         return ["mono", "--debug", str(self._program), "game", *ports_of(endpoints), follow]
 
+    def requests(self, endpoints: Endpoints, timeout_ms: int, *asked: str) -> GodotRun:
+        """A program that asks all of it at once and tells the answers."""
+        return GodotRun(
+            ["mono", "--debug", str(self._program), "requests", *ports_of(endpoints), str(timeout_ms), *asked]
+        )
+
     def bench(self, endpoints: Endpoints, manner: str) -> GodotRun:
         """A game that measures, and says nothing ("quiet") or its counters ("talk") until it ends."""
         nursery = f"--gc-params=nursery-size={NURSERY_BYTES // 1024}k"

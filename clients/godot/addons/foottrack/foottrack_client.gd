@@ -8,6 +8,8 @@ extends Node
 
 const Message := preload("wire/message.gd")
 const BusThread := preload("wire/bus_thread.gd")
+const Msgpack := preload("wire/msgpack.gd")
+const RequestLink := preload("wire/request_link.gd")
 
 ## The bus was found (again), and nothing is missed from now on.
 signal connected
@@ -22,6 +24,8 @@ signal event_received(message: Message)
 ## Something came that was no message; at most once a second. With reason "version" the addon and the service do not
 ## fit together.
 signal refused(topic: String, reason: String, detail: String)
+## What `request` waits for.
+signal answered(id: int, answer: Dictionary)
 
 ## Where the service is. Changes count when the client enters the tree.
 @export var host := "127.0.0.1"
@@ -40,6 +44,8 @@ var _newest := {}
 var _sid := ""
 var _was_connected := false
 var _trouble := ""
+var _requests := 0
+var _unanswered := {}
 var _last_refusal_usec := -1_000_000
 
 
@@ -62,6 +68,8 @@ func _enter_tree() -> void:
 func _exit_tree() -> void:
 	_thread.stop()
 	_thread = null
+	for id: int in _unanswered.keys():
+		_answer(id, RequestLink.failure(RequestLink.TIMEOUT, "the client left the scene"))
 
 
 func _process(_delta: float) -> void:
@@ -74,6 +82,8 @@ func _process(_delta: float) -> void:
 	for topic: String in batch.newest:
 		_newest[topic] = batch.newest[topic]
 		pose_received.emit(batch.newest[topic])
+	for id: int in batch.answers:
+		_answer(id, batch.answers[id])
 	if not batch.refusal.is_empty():
 		_tell(batch.refusal)
 
@@ -119,9 +129,34 @@ func publish(stream: String, t_usec: int, data: Dictionary, valid := true) -> vo
 	_thread.publish(message)
 
 
+## Asks the service (SPEC, section 7), as in `await client.request("calibrate/floor", {}, 60.0)`. The answer is
+## {ok: true, result} or {ok: false, error: {code, message}}; the code is "timeout" where none came.
+func request(cmd: String, args := {}, timeout_s := 2.0) -> Dictionary:
+	_requests += 1
+	var asked := RequestLink.Request.new()
+	asked.id = _requests
+	asked.cmd = cmd
+	asked.payload = Msgpack.pack({"cmd": cmd, "args": args})
+	asked.deadline_usec = Time.get_ticks_usec() + int(timeout_s * 1e6)
+	if _thread == null:
+		return RequestLink.failure(RequestLink.TIMEOUT, "the client is in no scene")
+	_unanswered[asked.id] = true
+	_thread.ask(asked)
+	while true:
+		var told: Array = await answered
+		if told[0] == asked.id:
+			return told[1]
+	return {}
+
+
 ## Counters: connections, messages, gaps and refusals by topic, what was sent and not.
 func statistics() -> Dictionary:
 	return _thread.state()
+
+
+func _answer(id: int, answer: Dictionary) -> void:
+	_unanswered.erase(id)
+	answered.emit(id, answer)
 
 
 func _notice_connection() -> void:

@@ -1,4 +1,5 @@
 using System;
+using System.Collections.Generic;
 using UnityEngine;
 
 namespace Foottrack
@@ -80,6 +81,17 @@ namespace Foottrack
         public PublishResult PublishHead(HeadPose pose, long ownNs)
         {
             return Connection == null ? PublishResult.NoBus : Connection.PublishHead(pose, ownNs, true);
+        }
+
+        /// <summary>
+        /// Asks the service, as in
+        /// <c>var floor = client.Request("calibrate/floor", null, 60f); yield return new WaitUntil(() => floor.IsDone);</c>
+        /// Null while it is not enabled.
+        /// </summary>
+        public ControlRequest Request(
+            string command, IDictionary<string, object> arguments = null, float timeoutSeconds = 2f)
+        {
+            return Connection == null ? null : Connection.Request(command, arguments, (int)(timeoutSeconds * 1000f));
         }
 
         private void OnEnable()

@@ -13,6 +13,7 @@ namespace Foottrack.Tests
                 case "tests": return EditorTests.Run();
                 case "allocations": return Allocations.Run(arguments[1], int.Parse(arguments[2]));
                 case "game": return Game.Run(arguments);
+                case "requests": return Requests.Run(arguments);
                 case "bench": return Bench.Run(arguments);
                 default:
                     Console.Error.WriteLine("unknown: " + arguments[0]);

@@ -6,6 +6,7 @@ const Envelope := preload("envelope.gd")
 const EgressLink := preload("egress_link.gd")
 const IngressLink := preload("ingress_link.gd")
 const ControlLink := preload("control_link.gd")
+const RequestLink := preload("request_link.gd")
 const Message := preload("message.gd")
 const Statistics := preload("statistics.gd")
 const TimeSync := preload("time_sync.gd")
@@ -25,6 +26,8 @@ class Batch:
 	var newest := {}
 	## All of the others, in order.
 	var every: Array[Message] = []
+	## What the service answered, by the request's id.
+	var answers := {}
 	## The last refusal: [topic, reason, detail]; empty without one.
 	var refusal: Array = []
 
@@ -35,6 +38,7 @@ var _stop := false
 # Guarded by the mutex.
 var _batch := Batch.new()
 var _outbox: Array[Message] = []
+var _requests: Array[RequestLink.Request] = []
 var _statistics := Statistics.new()
 var _state := {}
 var _overflow := 0
@@ -68,6 +72,13 @@ func take() -> Batch:
 func publish(message: Message) -> void:
 	_mutex.lock()
 	_outbox.append(message)
+	_mutex.unlock()
+
+
+## Asks the service; the answer comes with a batch.
+func ask(request: RequestLink.Request) -> void:
+	_mutex.lock()
+	_requests.append(request)
 	_mutex.unlock()
 
 
@@ -117,6 +128,7 @@ func _run(host: String, ingress: int, egress: int, control: int, prefixes: Packe
 	var down := EgressLink.new(host, egress, prefixes)
 	var up := IngressLink.new(host, ingress)
 	var asks := ControlLink.new(host, control)
+	var wants := RequestLink.new(host, control)
 	var decoder := Envelope.new()
 	var next_seq := {}
 	var next_state_usec := 0
@@ -125,26 +137,33 @@ func _run(host: String, ingress: int, egress: int, control: int, prefixes: Packe
 		var came := asks.poll(now)
 		came = up.poll(now) or came
 		came = down.poll(now) or came
+		came = wants.poll(now) or came
 		var batch := _decode(down, asks, decoder)
 		_mutex.lock()
 		var stopping := _stop
 		_keep(batch)
+		_batch.answers.merge(wants.answers)
+		wants.answers.clear()
 		_offset = asks.time.offset
 		_fresh_until_ns = asks.time.fresh_until()
 		if now >= next_state_usec or down.is_live != _live:
 			_live = down.is_live
 			next_state_usec = now + _STATE_PERIOD_USEC
-			_state = _describe(down, up, asks)
+			_state = _describe(down, up, asks, wants)
 		var outbox := _outbox
 		_outbox = []
+		var requests := _requests
+		_requests = []
 		_mutex.unlock()
+		for request in requests:
+			wants.ask(request)
 		for message in outbox:
 			_send(message, up, asks.time, decoder, next_seq)
 		if stopping:
 			break
 		if not came:
-			OS.delay_usec(_pause(down, up, asks))
-	for link in [down, up, asks]:
+			OS.delay_usec(_WAITING_FOR_TIME_USEC if asks.is_waiting() else _pause(down, up, wants))
+	for link in [down, up, asks, wants]:
 		link.close()
 
 
@@ -196,7 +215,7 @@ func _send(message: Message, up: IngressLink, time: TimeSync, encoder: Envelope,
 	up.publish(frames)
 
 
-static func _describe(down: EgressLink, up: IngressLink, asks: ControlLink) -> Dictionary:
+static func _describe(down: EgressLink, up: IngressLink, asks: ControlLink, wants: RequestLink) -> Dictionary:
 	var own := Time.get_ticks_usec() * 1000
 	return {
 		"connected": down.is_live,
@@ -206,8 +225,8 @@ static func _describe(down: EgressLink, up: IngressLink, asks: ControlLink) -> D
 		"unsent": up.drops.duplicate(),
 		"session": asks.session,
 		"uncertainty_ns": asks.time.uncertainty(own) if asks.time.is_known else -1,
-		"violations": down.violations + up.violations + asks.violations,
-		"stalls": down.stalls + up.stalls + asks.stalls,
+		"violations": down.violations + up.violations + asks.violations + wants.violations,
+		"stalls": down.stalls + up.stalls + asks.stalls + wants.stalls,
 		"bad_answers": asks.bad_answers,
 		"fault": _fault(down, up, asks),
 	}
@@ -222,7 +241,5 @@ static func _fault(down: EgressLink, up: IngressLink, asks: ControlLink) -> Stri
 	return "" if asks.is_ready() else asks.last_fault
 
 
-static func _pause(down: EgressLink, up: IngressLink, asks: ControlLink) -> int:
-	if asks.is_waiting():
-		return _WAITING_FOR_TIME_USEC
-	return _BUSY_USEC if down.is_ready() or up.is_ready() else _AWAY_USEC
+static func _pause(down: EgressLink, up: IngressLink, wants: RequestLink) -> int:
+	return _BUSY_USEC if down.is_ready() or up.is_ready() or wants.is_waiting() else _AWAY_USEC

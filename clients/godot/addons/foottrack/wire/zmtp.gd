@@ -12,7 +12,8 @@ const _GREETING_BYTES := 64
 const _MORE := 1
 const _LONG := 2
 const _COMMAND := 4
-const _PEERS := {"SUB": ["PUB", "XPUB"], "XPUB": ["SUB", "XSUB"], "REQ": ["REP", "ROUTER"]}
+const _PEERS := {"SUB": ["PUB", "XPUB"], "XPUB": ["SUB", "XSUB"], "REQ": ["REP", "ROUTER"],
+		"DEALER": ["REP", "ROUTER"]}
 
 ## Both sides have said READY.
 var is_ready := false

@@ -30,6 +30,7 @@ namespace Foottrack
         private readonly EgressLink _egress;
         private readonly IngressLink _ingress;
         private readonly ControlLink _control;
+        private readonly RequestLink _requests;
 
         /// <summary>Throws ArgumentException for names that have no place on the wire.</summary>
         public FoottrackConnection(ConnectionSettings settings)
@@ -41,6 +42,7 @@ namespace Foottrack
                 prefixes.Add(settings.User + "/" + stream);
             }
             _control = new ControlLink(settings.Host, settings.ControlPort, _time);
+            _requests = new RequestLink(settings.Host, settings.ControlPort);
             _receiver = new Receiver(_control.OnSession);
             _egress = new EgressLink(settings.Host, settings.EgressPort, prefixes, _receiver);
             _ingress = new IngressLink(settings.Host, settings.IngressPort, encoder);
@@ -76,9 +78,11 @@ namespace Foottrack
         public void Dispose()
         {
             _control.Stop();
+            _requests.Stop();
             _egress.Stop();
             _ingress.Stop();
             _control.Dispose();
+            _requests.Dispose();
             _egress.Dispose();
             _ingress.Dispose();
         }
@@ -127,6 +131,16 @@ namespace Foottrack
             return _ingress.Publish(ref head, ownNs + offset, now + offset, valid && _time.IsFresh(now));
         }
 
+        /// <summary>
+        /// Asks the service (SPEC, section 7), as in Request("calibrate/floor", null, 60000). Arguments are numbers,
+        /// strings, bools and null; throws ArgumentException for others.
+        /// </summary>
+        public ControlRequest Request(
+            string command, IDictionary<string, object> arguments = null, int timeoutMs = 2000)
+        {
+            return _requests.Ask(command, arguments, timeoutMs);
+        }
+
         /// <summary>The bus clock at an instant of <see cref="OwnClock"/>; false while it is not known.</summary>
         public bool TryGetBusTime(long ownNs, out long busNs)
         {
@@ -146,7 +160,7 @@ namespace Foottrack
         /// <summary>All counters, now.</summary>
         public ConnectionStatistics Statistics()
         {
-            var links = new Link[] { _egress, _ingress, _control };
+            var links = new Link[] { _egress, _ingress, _control, _requests };
             var made = new ConnectionStatistics
             {
                 Welcomes = _egress.Welcomes,

@@ -71,7 +71,10 @@ namespace Foottrack
         public void Dispose()
         {
             Stop();
-            _thread.Join(JoinMs);
+            if (_thread.IsAlive)
+            {
+                _thread.Join(JoinMs);
+            }
         }
 
         protected bool IsStopping { get { return Stopping.WaitOne(0); } }

@@ -26,6 +26,9 @@ namespace Foottrack
             set { _at = value; }
         }
 
+        /// <summary>What the next value begins with; nil's after a fault.</summary>
+        public int Code { get { return Fault == Refusal.None ? _bytes[_at] : 0xc0; } }
+
         /// <summary>Scans the payload and goes to its value.</summary>
         public void Load(byte[] bytes, int offset, int length)
         {
