@@ -1,6 +1,6 @@
-"""How fast the Godot addon is, beside a pyzmq subscriber in the same run, and what a long run does to it.
+"""How fast the Godot addon is, beside a pyzmq subscriber in the same run.
 
-Run: python tests/clients/bench_godot.py [--seconds 10] [--hz 200 1000] [--long-minutes 10]
+Run: python tests/clients/bench_godot.py [--seconds 10] [--hz 200 1000]
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def measured(godot: GodotProject, hz: float, seconds: float) -> dict[str, Any]:
         "gaps": sum(topic["gaps"] for topic in topics.values()),
         "uncertainty_ms": said["statistics"]["uncertainty_ns"] * 1e-6,
         "godot_thread_ms": quantiles(said["in_thread_ms"]),
-        "godot_main_thread_ms": quantiles(said["in_process_ms"]),
+        "godot_main_thread_ms": quantiles(said["in_main_ms"]),
         "longest_frame_ms": round(said["longest_frame_ms"], 1),
         "pyzmq_ms": quantiles(peer.late_ms),
     }
@@ -107,50 +107,6 @@ def throughput(godot: GodotProject) -> dict[str, Any]:
     return {"messages_per_s": round(BURST / took), "gaps": said["statistics"]["topics"]["user/pose/body"]["gaps"]}
 
 
-def long_run(godot: GodotProject, minutes: float) -> dict[str, Any]:
-    """200 Hz with two restarts of the service: what is lost beyond what was sent while it was down, and the memory."""
-    third_s = minutes * 20.0
-    memory_kb, events, unsent = [], 0, 0
-    with LiveService() as service, Client(service.endpoints) as client:
-        publisher = client.publisher("bench")
-        with bench(godot, service) as run:
-            for part in range(3):
-                publisher.wait_ready()
-                run.until("connected")
-                # In slices, so that memory is seen to grow or not.
-                for _ in range(4):
-                    events = publish_at(publisher, 200.0, third_s / 4, events)
-                    memory_kb.append(run.memory_kb())
-                if part < 2:
-                    settle(run, events - unsent)
-                    service.stop()
-                    while publisher.live:
-                        pass
-                    for _ in range(50):
-                        publisher.publish("gait/event", step(events))
-                        events += 1
-                        unsent += 1
-                    service.start()
-            publisher.publish("gait/event", FINAL)
-            said = run.until("final")
-    return {
-        "minutes": minutes,
-        "events": events,
-        "sent_while_down": unsent,
-        "lost": events - unsent - said["events"],
-        "gaps": said["statistics"]["topics"]["user/gait/event"]["gaps"],
-        "welcomes": said["statistics"]["welcomes"],
-        "memory_mb": [round(kb / 1024, 1) for kb in memory_kb],
-        "longest_frame_ms": round(said["longest_frame_ms"], 1),
-    }
-
-
-def settle(run: GodotRun, events: int) -> None:
-    """Wait until the engine has what was sent, so that nothing under way is lost with the service."""
-    while run.until("frames")["statistics"]["topics"]["user/gait/event"]["messages"] < events:
-        pass
-
-
 def received(line: dict[str, Any]) -> int:
     """Poses so far, in a line of statistics."""
     topic = line["statistics"]["topics"].get("user/pose/body", {"messages": 0})
@@ -167,7 +123,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--hz", type=float, nargs="*", default=[200.0, 1000.0])
-    parser.add_argument("--long-minutes", type=float, default=0.0)
     asked = parser.parse_args()
     found = find_godot()
     if found is None:
@@ -177,8 +132,6 @@ def main() -> None:
             print(json.dumps(measured(godot, hz, asked.seconds)), flush=True)
         if asked.hz:
             print(json.dumps(throughput(godot)), flush=True)
-        if asked.long_minutes:
-            print(json.dumps(long_run(godot, asked.long_minutes)), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""How fast the Unity package is under mono, beside a pyzmq subscriber in the same run; what a long run does to it.
+"""How fast the Unity package is under mono, beside a pyzmq subscriber in the same run.
 
-Run: python tests/clients/bench_unity.py [--seconds 10] [--hz 200 1000] [--long-minutes 10]
+Run: python tests/clients/bench_unity.py [--seconds 10] [--hz 200 1000]
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from bench_godot import BURST, Peer, publish_at, quantiles, received, settle
-from client_traffic import FINAL, POSE, step
-from godot_project import GodotRun
+from bench_godot import BURST, Peer, publish_at, quantiles, received
+from client_traffic import FINAL, POSE
 from live_service import LiveService
 from unity_mono import MISSING, NURSERY_BYTES, UnityPackage, has_mono
 
@@ -43,7 +42,7 @@ def measured(unity: UnityPackage, hz: float, seconds: float) -> dict[str, Any]:
         "gaps": sum(topic["gaps"] for topic in topics.values()),
         "uncertainty_ms": said["statistics"]["uncertainty_ns"] * 1e-6,
         "unity_thread_ms": quantiles(said["in_thread_ms"]),
-        "unity_main_thread_ms": quantiles(said["in_update_ms"]),
+        "unity_main_thread_ms": quantiles(said["in_main_ms"]),
         "longest_frame_ms": round(said["longest_frame_ms"], 1),
         "collections": said["collections"],
         "garbage_bytes_per_message_below": round((said["collections"] + 1) * NURSERY_BYTES / (hz * seconds), 1),
@@ -71,57 +70,11 @@ def throughput(unity: UnityPackage) -> dict[str, Any]:
     return {"messages_per_s": round(BURST / took), "gaps": said["statistics"]["topics"]["user/pose/body"]["gaps"]}
 
 
-def long_run(unity: UnityPackage, minutes: float) -> dict[str, Any]:
-    """200 Hz with two restarts of the service: what is lost beyond what was sent while it was down, and the memory."""
-    third_s = minutes * 20.0
-    memory_kb, events, unsent = [], 0, 0
-    with LiveService() as service, Client(service.endpoints) as client:
-        publisher = client.publisher("bench")
-        with unity.bench(service.endpoints, "talk") as run:
-            run.until("connected")
-            for part in range(3):
-                publisher.wait_ready()
-                found_again(run, part + 1)
-                # In slices, so that memory is seen to grow or not.
-                for _ in range(4):
-                    events = publish_at(publisher, 200.0, third_s / 4, events)
-                    memory_kb.append(run.memory_kb())
-                if part < 2:
-                    settle(run, events - unsent)
-                    service.stop()
-                    while publisher.live:
-                        pass
-                    for _ in range(50):
-                        publisher.publish("gait/event", step(events))
-                        events += 1
-                        unsent += 1
-                    service.start()
-            publisher.publish("gait/event", FINAL)
-            said = run.until("final")
-    return {
-        "minutes": minutes,
-        "events": events,
-        "sent_while_down": unsent,
-        "lost": events - unsent - said["events"],
-        "gaps": said["statistics"]["topics"]["user/gait/event"]["gaps"],
-        "welcomes": said["statistics"]["welcomes"],
-        "memory_mb": [round(kb / 1024, 1) for kb in memory_kb],
-        "longest_frame_ms": round(said["longest_frame_ms"], 1),
-    }
-
-
-def found_again(run: GodotRun, welcomes: int) -> None:
-    """Wait until all subscriptions are in force once more."""
-    while run.until("frames")["statistics"]["welcomes"] < welcomes:
-        pass
-
-
 def main() -> None:
     """Print one line of JSON for each measurement."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--hz", type=float, nargs="*", default=[200.0, 1000.0])
-    parser.add_argument("--long-minutes", type=float, default=0.0)
     asked = parser.parse_args()
     if not has_mono():
         raise SystemExit(MISSING)
@@ -131,8 +84,6 @@ def main() -> None:
             print(json.dumps(measured(unity, hz, asked.seconds)), flush=True)
         if asked.hz:
             print(json.dumps(throughput(unity)), flush=True)
-        if asked.long_minutes:
-            print(json.dumps(long_run(unity, asked.long_minutes)), flush=True)
 
 
 if __name__ == "__main__":
