@@ -82,7 +82,7 @@ class Recorder:
     def __init__(self, bus: Bus, settings: Settings, folder: Path) -> None:
         self._bus = bus
         self._settings = settings
-        self._folder = folder
+        self._folder = folder.absolute()
         self._began = 0
         self._writer: RecordingWriter | None = None
         self._task: asyncio.Task[WriterStats] | None = None

@@ -11,7 +11,7 @@ from typing import Any
 from foottrack_protocol.control import Code
 from foottrack_service.bus.control_client import ControlClient
 from foottrack_service.bus.endpoints import Context, check_loopback
-from foottrack_service.bus.errors import ControlError, ControlTimeout
+from foottrack_service.bus.errors import BusError, ControlError, ControlTimeout
 
 _PATIENCE_S = 1.0
 
@@ -35,8 +35,14 @@ class ReplayDesk:
         }
 
     def attach(self, endpoint: str) -> dict[str, Any]:
-        """A replay can be asked at ``endpoint`` on this host. The last one that came is the one that is spoken for."""
-        check_loopback(endpoint)
+        """A replay can be asked at ``endpoint`` on this host. The last one that came is the one that is spoken for.
+
+        Raises ControlError for an endpoint that is none, or that others could reach.
+        """
+        try:
+            check_loopback(endpoint)
+        except BusError as error:
+            raise ControlError(Code.BAD_ARGUMENTS, str(error)) from None
         self.close()
         self._replay = ControlClient(self._context, endpoint)
         return {}

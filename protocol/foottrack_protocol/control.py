@@ -84,13 +84,13 @@ class RecordStart(Body):
 class RecordingFile(Body):
     """Where it goes."""
 
-    file: Str = Field(description="path on the service's host")
+    file: Str = Field(description="absolute path on the service's host")
 
 
 class Recorded(Body):
     """What was recorded."""
 
-    file: Str = Field(description="path on the service's host")
+    file: Str = Field(description="absolute path on the service's host")
     messages: Count
     dropped: Count = Field(description="messages that the recorder could not keep up with")
     duration: Seconds
@@ -121,6 +121,7 @@ class ReplayState(Body):
     duration: Seconds = Field(description="of the whole recording")
     rate: Annotated[float, Strict(), Field(gt=0.0, le=1000.0)]
     paused: Bool
+    published: Count = Field(description="messages, so far")
 
 
 @dataclass(frozen=True, slots=True)

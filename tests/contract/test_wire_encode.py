@@ -154,6 +154,6 @@ def test_a_request_that_no_service_takes_is_refused(values: Any) -> None:
 
 
 def test_bodies_inside_answers_are_maps() -> None:
-    state = ReplayState(position=1.5, duration=60.0, rate=1.0, paused=False)
+    state = ReplayState(position=1.5, duration=60.0, rate=1.0, paused=False, published=7)
     answer = unpack_map(pack_map({"ok": True, "result": state}))
     assert COMMANDS["replay/pause"].result.model_validate(answer["result"]) == state

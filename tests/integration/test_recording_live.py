@@ -59,9 +59,13 @@ def test_what_is_published_is_recorded_to_the_byte(bus: Bus, run: Run, tmp_path:
     assert from_toml(config) == SETTINGS
 
 
-def test_recordings_on_request_go_into_their_folder_and_nowhere_else(bus: Bus, run: Run, tmp_path: Path) -> None:
+def test_recordings_on_request_go_into_their_folder_and_nowhere_else(
+    bus: Bus, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
     async def scenario() -> None:
-        recorder = node.Recorder(bus, SETTINGS, tmp_path / "recordings")
+        recorder = node.Recorder(bus, SETTINGS, Path("recordings"))
         server = ControlServer(bus.context, "inproc://control-of-this-test", recorder.handlers)
         serving = asyncio.create_task(server.run())
         settings = bus.settings.model_copy(update={"control": server.endpoint})
