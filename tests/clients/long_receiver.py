@@ -5,45 +5,46 @@ Run as a program: ``long_receiver.py python|pyzmq ENDPOINTS``, the endpoints as 
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import sys
 import time
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import msgpack
 import zmq
 from client_traffic import FINAL_STEP
 from godot_project import LINE
+from python_game import as_json
 
 from foottrack_client import Client, Endpoints
 
 SAMPLES = 500_000
 PREFIXES = ("gait/", "pose/")
+Counters = list[Callable[[], dict[str, Any]]]
 
 
 def say(kind: str, **values: Any) -> None:
     print(LINE + json.dumps({"kind": kind, **values}), flush=True)
 
 
-def with_client(endpoints: Endpoints, counters: dict[str, Any]) -> Iterator[tuple[int, str | None, int]]:
-    """t_pub, the gait event if it is one, and its step, of each message; what was counted by the time it ends."""
+def with_client(endpoints: Endpoints, counters: Counters) -> Iterator[tuple[int, str | None, int]]:
+    """t_pub, the gait event if it is one, and its step, of each message; and its counters."""
     with Client(endpoints) as client, client.subscribe(*PREFIXES) as subscription:
+        counters.append(lambda: as_json(subscription.statistics))
         found = 0
         while True:
             message = subscription.receive(0.1)
             if subscription.statistics.connections > found:
                 found = subscription.statistics.connections
                 say("connected")
-            counters.update(dataclasses.asdict(subscription.statistics))
             if message is not None:
                 is_event = message.stream == "gait/event"
                 yield message.t_pub, message.data.event if is_event else None, message.data.step if is_event else 0
 
 
-def bare(endpoints: Endpoints, counters: dict[str, Any]) -> Iterator[tuple[int, str | None, int]]:
+def bare(endpoints: Endpoints, counters: Counters) -> Iterator[tuple[int, str | None, int]]:
     """The same without a client: the floor."""
     socket = zmq.Context().socket(zmq.SUB)
     socket.set_hwm(10_000)
@@ -51,7 +52,8 @@ def bare(endpoints: Endpoints, counters: dict[str, Any]) -> Iterator[tuple[int, 
         socket.subscribe(f"user/{prefix}")
     socket.subscribe("sys/welcome")
     socket.connect(endpoints.egress)
-    topics: dict[str, dict[str, int]] = counters.setdefault("topics", {})
+    topics: dict[str, dict[str, int]] = {}
+    counters.append(lambda: {"topics": topics})
     last: dict[str, int] = {}
     while True:
         frames = socket.recv_multipart()
@@ -76,7 +78,7 @@ def main(kind: str, endpoints: Endpoints) -> None:
     # Taken now, so that memory that grows is the client's.
     late_ms = array("d", bytes(8 * SAMPLES))
     measured = events = 0
-    counters: dict[str, Any] = {}
+    counters: Counters = []
     for t_pub, event, step in (with_client if kind == "python" else bare)(endpoints, counters):
         if measured < SAMPLES:
             late_ms[measured] = (time.perf_counter_ns() - t_pub) * 1e-6
@@ -87,7 +89,7 @@ def main(kind: str, endpoints: Endpoints) -> None:
             break
         elif event is not None:
             events += 1
-    say("final", events=events, in_main_ms=list(late_ms[:measured]), statistics=counters)
+    say("final", events=events, in_main_ms=list(late_ms[:measured]), statistics=counters[0]())
 
 
 if __name__ == "__main__":

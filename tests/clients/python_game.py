@@ -7,7 +7,6 @@ gait event "stop" with the step FINAL ends it.
 from __future__ import annotations
 
 import asyncio
-import dataclasses
 import json
 import sys
 from typing import Any
@@ -15,7 +14,7 @@ from typing import Any
 from client_traffic import FINAL, UPRIGHT
 from godot_project import LINE
 
-from foottrack_client import AsyncClient, AsyncSubscription, Endpoints
+from foottrack_client import AsyncClient, AsyncSubscription, Endpoints, Statistics
 from foottrack_protocol.messages import HeadPose
 
 FRAME_S = 0.02
@@ -26,16 +25,26 @@ def say(kind: str, **values: Any) -> None:
     print(LINE + json.dumps({"kind": kind, **values}), flush=True)
 
 
+def as_json(statistics: Statistics) -> dict[str, Any]:
+    """A subscription's counters."""
+    topics = {
+        name: {"messages": topic.messages, "gaps": topic.gaps, "drops": dict(topic.drops)}
+        for name, topic in statistics.topics.items()
+    }
+    return {"topics": topics, "drops": dict(statistics.drops), "connections": statistics.connections}
+
+
 def counters(client: AsyncClient, subscription: AsyncSubscription) -> dict[str, Any]:
-    return {**dataclasses.asdict(subscription.statistics), "offset_ns": client.clock.offset}
+    return {**as_json(subscription.statistics), "offset_ns": client.clock.offset}
 
 
 async def frames(client: AsyncClient, subscription: AsyncSubscription) -> None:
     head = HeadPose(p=(0.25, 1.5, -0.5), q=UPRIGHT, tracked=True)
-    publisher = await client.publisher("python", 40.0)
+    bus = asyncio.ensure_future(client.publisher("python", 3600.0))
     found = 0
     for frame in range(1_000_000_000):
-        publisher.publish("head/pose", head)
+        if bus.done():
+            bus.result().publish("head/pose", head)
         if subscription.statistics.connections > found:
             found = subscription.statistics.connections
             say("connected")
@@ -48,19 +57,19 @@ async def frames(client: AsyncClient, subscription: AsyncSubscription) -> None:
 async def main(endpoints: Endpoints, same_host: bool) -> None:
     with AsyncClient(endpoints, same_host=same_host) as client:
         subscription = client.subscribe("pose/", "gait/")
-        work = [asyncio.ensure_future(frames(client, subscription))]
-        if not same_host:
-            work.append(asyncio.ensure_future(client.keep_synchronised()))
-        steps = []
-        async for message in subscription:
-            if message.data == FINAL:
-                break
-            if message.stream == "gait/event":
-                steps.append(message.data.step)
-        say("final", steps=steps, statistics=counters(client, subscription))
-        for task in work:
-            task.cancel()
-        await asyncio.gather(*work, return_exceptions=True)
+        async with asyncio.TaskGroup() as tasks:
+            work = [tasks.create_task(frames(client, subscription))]
+            if not same_host:
+                work.append(tasks.create_task(client.keep_synchronised()))
+            steps = []
+            async for message in subscription:
+                if message.data == FINAL:
+                    break
+                if message.stream == "gait/event":
+                    steps.append(message.data.step)
+            say("final", steps=steps, statistics=counters(client, subscription))
+            for task in work:
+                task.cancel()
 
 
 if __name__ == "__main__":

@@ -20,6 +20,8 @@ func _initialize() -> void:
 	_client.ingress_port = settings["ingress"]
 	_client.egress_port = settings["egress"]
 	_client.control_port = settings["control"]
+	if settings.has("streams"):
+		_client.streams = settings["streams"]
 	_client.connected.connect(func() -> void: _say({"kind": "connected"}))
 	_client.disconnected.connect(func(why: String) -> void: _say({"kind": "disconnected", "why": why}))
 	_client.troubled.connect(func(why: String) -> void: _say({"kind": "troubled", "why": why}))
