@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import socket
-from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from foottrack_service.bus import Broker
-from foottrack_service.bus.security import load_keys, new_keys
+from foottrack_service.bus.security import new_keys
 from foottrack_service.config import BusSettings
 from foottrack_service.curve_settings import CurveClient, CurveSettings, Role
 
@@ -38,33 +36,3 @@ class Keyring:
         if name is None:
             return CurveSettings()
         return CurveSettings(secret=self.folder / f"{name}.key_secret", service=service or self.service)
-
-
-def three_free_ports() -> int:
-    """The first of three in a row."""
-    while True:
-        with ExitStack() as stack, suppress(OSError):
-            first = stack.enter_context(socket.create_server(("127.0.0.1", 0))).getsockname()[1]
-            for port in (first + 1, first + 2):
-                stack.enter_context(socket.create_server(("127.0.0.1", port)))
-            return int(first)
-
-
-def service_toml(file: Path, listen: str) -> Path:
-    """Settings of a service with one client, in words; gives the folder of its keys."""
-    folder = file.parent / "keys"
-    service, client = new_keys(folder, "service"), new_keys(folder, "client")
-    assert service.secret != client.secret
-    file.write_text(
-        f'[bus.curve]\nsecret = "{(folder / "service.key_secret").as_posix()}"\nlisten = "{listen}"\n'
-        f'[[bus.curve.clients]]\nname = "client"\nkey = "{client.public}"\n',
-        encoding="utf-8",
-    )
-    return folder
-
-
-def client_toml(file: Path, folder: Path) -> None:
-    """Settings of that client."""
-    secret = folder / "client.key_secret"
-    service = load_keys(folder / "service.key_secret").public
-    file.write_text(f'[bus.curve]\nsecret = "{secret.as_posix()}"\nservice = "{service}"\n', encoding="utf-8")

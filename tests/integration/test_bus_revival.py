@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 from bus_traffic import publish, take
-from curve_keys import Keyring, three_free_ports
+from curve_keys import Keyring
+from free_ports import three_free_ports
 from zmtp import GREETING
 
 from foottrack_service.bus import Broker, Bus, ControlServer

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from bus_traffic import BODY
-from curve_keys import three_free_ports
+from free_ports import three_free_ports
 from typer.testing import CliRunner
 
 from foottrack_protocol import Message

@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 from bus_traffic import BODY, publish, take
-from curve_keys import EPHEMERAL, Keyring, three_free_ports
+from curve_keys import EPHEMERAL, Keyring
+from free_ports import three_free_ports
 from typer.testing import CliRunner, Result
 
 from foottrack_protocol import encode
