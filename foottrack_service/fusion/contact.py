@@ -45,8 +45,9 @@ SEEN_LEAST = 6
 SEEN_NOISE = 0.04
 """m/s: fixes of a standing foot may drift apart by so much through errors of the camera's mount."""
 
-# memory, shape (3,): the swing's peak that fades, the newest sample's statistic, how long it was pushed
-PEAK, STATISTIC, DOUBTED = 0, 1, 2
+# memory, shape (4,): the swing's peak that fades, the newest sample's statistic, how long it was pushed, and for how
+# many seconds in all it was not quiet
+PEAK, STATISTIC, DOUBTED, UNREST = 0, 1, 2, 3
 
 
 @compiled
@@ -91,11 +92,13 @@ def stillness(t: Stamps, rows: Array, i: int) -> tuple[float, Vector]:
 def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, memory: Array) -> float:
     """How well the foot's velocity is known to be zero at the IMU row i, m/s per 10 ms; 0.0 when it swings.
 
-    ``dt``, s, since the last sample; ``x`` and ``P`` the filter before it; ``memory``, shape (3,), is carried from
+    ``dt``, s, since the last sample; ``x`` and ``P`` the filter before it; ``memory``, shape (4,), is carried from
     sample to sample.
     """
     statistic, mean = stillness(t, rows, i)
     memory[STATISTIC] = statistic
+    if not statistic < QUIET:
+        memory[UNREST] += dt
     if not math.isfinite(statistic):
         return 0.0
     memory[PEAK] = max(memory[PEAK] * math.exp(-dt / SWING_MEMORY_S), statistic)

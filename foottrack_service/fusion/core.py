@@ -67,6 +67,8 @@ class FusionCore:
         watched = settings.fusion.mount_calibration and settings.fusion.filter == "error-state"
         self._watch = MountWatch(settings.camera.mount_hash) if watched else None
         self._feet: dict[Side, Foot] = {side: Foot(settings, side, self._heads, self._watch, make) for side in SIDES}
+        self._feet["left"].beside(self._feet["right"])
+        self._feet["right"].beside(self._feet["left"])
         self._toes = {side: np.array(settings.feet.of(side).toe.p) for side in SIDES}
         self._shortest_ns = round(1e9 / settings.fusion.max_output_hz)
         self._silence_ns = round(settings.fusion.silence * 1e9)
@@ -141,6 +143,8 @@ class FusionCore:
         self._origin = body.origin
         if not body.tracked or body.p is None or body.q is None or max(map(abs, body.p)) > _MOST_DISTANCE:
             self._heads.add_untracked(t)
+            for foot in self._feet.values():
+                foot.on_head_lost()
         else:
             self._heads.add(HeadSample(t, np.array(body.p), np.array(body.q)))
             self._started = True

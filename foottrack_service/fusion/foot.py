@@ -13,7 +13,7 @@ from foottrack_service import rotations as rot
 from foottrack_service.config import Placement, Settings
 from foottrack_service.fusion.filters import MakeFilter, make_filter
 from foottrack_service.fusion.head_history import HeadHistory
-from foottrack_service.fusion.interface import FootEstimate, HeadSample, ImuSample, Kind, OpticalFix, Verdict
+from foottrack_service.fusion.interface import FootEstimate, HeadSample, ImuSample, Kind, OpticalFix, Target, Verdict
 from foottrack_service.fusion.mount_watch import MountWatch
 from foottrack_service.rotations import Array
 
@@ -50,6 +50,7 @@ class Foot:
     ) -> None:
         self._settings, self._side, self._watch, self._make = settings, side, watch, make
         self._filter = make(settings, side)
+        self._other: Foot | None = None
         self._heads = heads
         self._delay_ns = round(settings.timing.imu_delay * 1e9)
         self._acc_bias: Array | None = None
@@ -60,6 +61,15 @@ class Foot:
         self._waiting: deque[_Waiting] = deque(maxlen=64)
         self._accepted: Counter[str] = Counter()
         self._rejected: Counter[str] = Counter()
+
+    def beside(self, other: Foot) -> None:
+        """The person has another foot."""
+        self._other = other
+        self._filter.beside(other.target)
+
+    def target(self, kind: Kind, t: int) -> Target | None:
+        """Where fixes of ``kind`` are expected at ``t``, ns; None while that is not well known."""
+        return self._filter.target(kind, t)
 
     @property
     def health(self) -> FilterHealth:
@@ -132,6 +142,10 @@ class Foot:
         if values.base == self._settings.camera.mount_hash:
             self._mount = Placement(p=values.p, q=values.q)
 
+    def on_head_lost(self) -> None:
+        """The headset does not know where it is."""
+        self._filter.on_head_lost()
+
     def on_recentred(self, p: Array | None, q: Array | None) -> None:
         """The stage moved, old to new; None when nobody knows how. Fixes that wait belong to the old one."""
         for _ in range(len(self._waiting) if p is None else 0):
@@ -148,6 +162,8 @@ class Foot:
             # A filter that lost its numbers starts again from the next measurement and never speaks them.
             self.reject("not_finite")
             self._filter = self._make(self._settings, self._side)
+            if self._other is not None:
+                self._filter.beside(self._other.target)
             return None
         return found
 

@@ -16,13 +16,24 @@ from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings, Placement
 from foottrack_service.fusion.compiled import is_compiled
 from foottrack_service.fusion.foot_filter_inertial import InertialFilter
-from foottrack_service.fusion.interface import FootEstimate, HeadSample, ImuSample, OpticalFix, Verdict
+from foottrack_service.fusion.interface import (
+    FootEstimate,
+    HeadSample,
+    ImuSample,
+    Kind,
+    OpticalFix,
+    Target,
+    Verdict,
+    Whereabouts,
+)
 from foottrack_service.fusion.ladder import BALL_68_OF_ONE_AXIS, Ladder
 from foottrack_service.fusion.pictures_only import PicturesOnlyFilter
 from foottrack_service.rotations import IDENTITY, Array
 
 SYSTEMATIC = 0.003
 """m per axis: what no amount of agreeing fixes takes away (lens, depth scale, head pose, where the tag is glued)."""
+SEEN_S = 0.3
+"""A fix accepted so recently shows that its foot is still tracked by its own."""
 
 _log = logging.getLogger(__name__)
 
@@ -93,6 +104,20 @@ class ErrorStateFilter:
         else:
             self._inertial.move(p, q)
             self._pictures.move(p, q)
+
+    def on_head_lost(self) -> None:
+        """The headset does not know where it is: what stood need not be where it was in the stage."""
+        self._inertial.doubt.forget()
+
+    def beside(self, other: Whereabouts) -> None:
+        """Two feet are never in one place."""
+        self._inertial.other = self._pictures.other = other
+
+    def target(self, kind: Kind, t: int) -> Target | None:
+        """Where fixes of ``kind`` are expected at ``t``, ns; None while that is not well known."""
+        source = self._inertial if self._inertial.begun and self._ladder.imu_alive(t) else self._pictures
+        p = source.target(kind, t)
+        return None if p is None else Target(p, self._ladder.fix_within(kind, t, SEEN_S))
 
     def estimate(self, t: int) -> FootEstimate | None:
         """The foot predicted to ``t``; None before anything is known."""

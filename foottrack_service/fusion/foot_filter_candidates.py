@@ -66,20 +66,27 @@ class Candidates:
 
     def __init__(self) -> None:
         self._kept: deque[Rejected] = deque(maxlen=64)
+        self._insists: tuple[int, int] | None = None
+        """Since when they have agreed, and when they did last, ns."""
 
     def clear(self) -> None:
         """A fix was accepted."""
         self._kept.clear()
+        self._insists = None
 
-    def add(self, rejected: Rejected, sure_for: float | None) -> list[Rejected] | None:
+    def add(self, rejected: Rejected, sure_for: float | None, insist_s: float = 0.0) -> list[Rejected] | None:
         """The fixes that agree with this newest one, oldest first, when they suffice; else None.
 
         ``sure_for``: seconds since the last accepted fix, of a foot that knows its place and speed well; else None.
+        ``insist_s``: for so long they must agree, where more than agreement speaks against them.
         """
         if self._kept and not 0 < rejected.t - self._kept[-1].t <= GAP_S * 1e9:
             self._kept.clear()
         self._kept.append(rejected)
-        if sure_for is None:
+        if insist_s > 0.0:
+            agreeing = self._insisting()
+            enough = self._insists is not None and rejected.t - self._insists[0] >= insist_s * 1e9 and bool(agreeing)
+        elif sure_for is None:
             agreeing = self._agreeing(max(SPAN_S, self._pace_s()), FASTEST, TURN_SLACK)
             enough = len(agreeing) >= FEW
         else:
@@ -88,13 +95,23 @@ class Candidates:
             same = all(k.turn is not None and abs(k.turn) < SAME_TURN for k in agreeing)
             enough = len(agreeing) > FEW and near and same
             if not enough:
-                agreeing = self._agreeing(2.0 * SURE_SPAN_S, SURE_FASTEST, TURN_SLACK)
-                enough = len(agreeing) > FEW and rejected.t - agreeing[0].t >= SURE_SPAN_S * 1e9
+                agreeing = self._insisting()
+                enough = bool(agreeing)
         if not enough:
             return None
-        self._kept.clear()
+        self.clear()
         # Only the last few start the filter anew: the older ones belong to a time when it was still confused.
         return agreeing[-2 * FEW :]
+
+    def _insisting(self) -> list[Rejected]:
+        """Those that have agreed for SURE_SPAN_S by now; empty when they have not. Notes since when they do."""
+        agreeing, t = self._agreeing(2.0 * SURE_SPAN_S, SURE_FASTEST, TURN_SLACK), self._kept[-1].t
+        if self._insists is not None and not 0 <= t - self._insists[1] <= 2e9 * SURE_SPAN_S:
+            self._insists = None
+        if len(agreeing) <= FEW or t - agreeing[0].t < SURE_SPAN_S * 1e9:
+            return []
+        self._insists = (agreeing[0].t if self._insists is None else self._insists[0], t)
+        return agreeing
 
     def _pace_s(self) -> float:
         """How long the last FEW fixes took, and a little."""

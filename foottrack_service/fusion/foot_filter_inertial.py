@@ -13,8 +13,9 @@ import numpy as np
 from foottrack_protocol.messages import Side
 from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings, Placement
-from foottrack_service.fusion.contact import QUIET, STATISTIC, SeenMotion, stance_sigma
-from foottrack_service.fusion.foot_filter_candidates import Candidates, Rejected, fill_reset
+from foottrack_service.fusion.contact import QUIET, STATISTIC, UNREST, SeenMotion, stance_sigma
+from foottrack_service.fusion.foot_filter_candidates import Rejected, fill_reset
+from foottrack_service.fusion.foot_filter_doubt import NOT_OURS, SURE_SIGMA, Doubt
 from foottrack_service.fusion.foot_filter_events import (
     ACCEPTED,
     ARM,
@@ -51,7 +52,7 @@ from foottrack_service.fusion.foot_filter_replay import (
     smallest_variances,
 )
 from foottrack_service.fusion.foot_filter_sample import SampleRows, first_state, upright, usable
-from foottrack_service.fusion.interface import FIX_MEMORY_S, ImuSample, Kind, OpticalFix, Verdict
+from foottrack_service.fusion.interface import FIX_MEMORY_S, ImuSample, Kind, OpticalFix, Verdict, Whereabouts
 from foottrack_service.fusion.timeline import Timeline
 from foottrack_service.rotations import Array
 
@@ -65,8 +66,8 @@ UNSURE_AFTER_S = 0.25
 """A hole in the IMU after which the place needs fixes that agree."""
 UNSURE_SIGMA = 0.3
 """m per axis: likewise."""
-SURE_AGE_S = 0.9
-SURE_SIGMA = 0.03
+KNOWN_SIGMA = 0.1
+"""m per axis: of a foot that may claim a fix."""
 
 
 class InertialFilter:
@@ -79,13 +80,14 @@ class InertialFilter:
         self._samples = SampleRows()
         self._last: Array = np.zeros(COLUMNS)
         self.newest, self._behind = 0, 0
-        self._memory, self._lock = np.zeros(3), np.zeros(9)
+        self._memory, self._lock = np.zeros(4), np.zeros(9)
         self._imu_yaw: float | None = None
         self._seen_yaw = False
         self._blob = Blob(foot)
-        self._candidates: dict[Kind, Candidates] = {"marker": Candidates(), "depth": Candidates()}
-        self._fix_t: dict[Kind, int] = {}
         self._motion = SeenMotion()
+        self.doubt = Doubt()
+        self.other: Whereabouts = lambda kind, t: None
+        """The other foot's ``target``."""
         self.acquired = False
         """Whether fixes have said where the foot is, and not too long ago."""
         self.place(foot.imu)
@@ -165,6 +167,10 @@ class InertialFilter:
         if math.sqrt(max(P[0, 0], P[1, 1], P[2, 2])) > UNSURE_SIGMA:
             self.acquired = False
         good = ours and place <= CHI_SQUARE_3 and turned_by <= CHI_SQUARE_1
+        point, off = row[POINT : POINT + 3].copy(), np.array(residual)
+        if float(off @ off) > NOT_OURS**2 and self.doubt.is_others(t, point, off, self.other(fix.kind, fix.t)):
+            self._replay(i)
+            return Verdict.IDENTITY
         if self.acquired and good:
             self._accept(i, t, fix.kind)
             return Verdict.ACCEPTED
@@ -174,10 +180,9 @@ class InertialFilter:
             if row[TURN_SIGMA] > 0.0:
                 turn = float(attitude_error(row[MEASURED_Q : MEASURED_Q + 4], x)[1])
             sigma = math.sqrt(max(row[POINT_COV], row[POINT_COV + 4], row[POINT_COV + 8]))
-            rejected = Rejected(
-                t, row[POINT : POINT + 3].copy(), np.array(residual), turn, sigma, row[ARM : ARM + 3].copy()
-            )
-            agreed = self._candidates[fix.kind].add(rejected, self._sure_for(P, t, fix.kind))
+            rejected = Rejected(t, point, off, turn, sigma, row[ARM : ARM + 3].copy())
+            known = math.sqrt(max(P[0, 0], P[1, 1], P[2, 2])) if acquired else None
+            agreed = self.doubt.agreed(rejected, fix.kind, known, self._memory[UNREST])
             if agreed is not None:
                 self._restart_from(agreed, fix)
                 return Verdict.ACCEPTED
@@ -205,16 +210,16 @@ class InertialFilter:
         timeline.X[:n, 3:6] = timeline.X[:n, 3:6] @ matrix.T
         timeline.X[:n, 6:10] = rot.multiply(q, timeline.X[:n, 6:10])
         timeline.P[:n] = turn @ timeline.P[:n] @ turn.T
+        self.doubt.moved(p, q)
         # Fixes of the old stage are in the checkpoints already; none of them may be replayed.
         timeline.restart(int(timeline.t[n - 1]))
-        self._clear_candidates()
         self._motion.clear()
         self._lock[:] = 0.0
 
     def lose(self) -> None:
         """The stage moved and nobody knows how: the place needs fixes that agree."""
         self.acquired, self._seen_yaw = False, False
-        self._clear_candidates()
+        self.doubt.forget()
         self._motion.clear()
         if self._timeline.n:
             last = self._timeline.restart(int(self._timeline.t[self._timeline.n - 1]))
@@ -256,6 +261,14 @@ class InertialFilter:
         q = rot.multiply(out[3:7], rot.conjugate(self._imu_q))
         return out[0:3], q, out[7:10], math.sqrt(out[10] / 3.0)
 
+    def target(self, kind: Kind, t: int) -> Array | None:
+        """Where in the stage fixes of ``kind`` are expected at ``t``, m; None while that is not well known."""
+        if not self.acquired:
+            return None
+        ankle, q, _, sd = self.predicted(t)
+        point = self._blob.point if kind == "depth" else np.array(self._foot.marker.p)
+        return ankle + rot.rotate(q, point) if sd < KNOWN_SIGMA else None
+
     def _begin(self, sample: ImuSample) -> None:
         q = upright(sample)
         if q is None:
@@ -283,33 +296,16 @@ class InertialFilter:
         rate: Array = near[GYRO : GYRO + 3] - self._timeline.X[i, 13:16]
         return rate
 
-    def _clear_candidates(self) -> None:
-        for candidates in self._candidates.values():
-            candidates.clear()
-
     def _accept(self, i: int, t: int, kind: Kind) -> None:
         timeline = self._timeline
         row = timeline.rows[i]
         row[ACCEPTED] = 1.0
-        self._fix_t[kind] = t
-        self._candidates["depth"].clear()
-        if kind == "marker":
-            self._candidates["marker"].clear()
         self._motion.see(t, row[POINT : POINT + 3].copy())
+        self.doubt.accept(t, kind, self._memory[UNREST], self._motion.speed > 0.0)
         if self._motion.speed > 0.0:
             sigmas = timeline.rows[i + 1 : timeline.n, ZERO_SIGMA]
             sigmas[sigmas > 0.0] = np.maximum(sigmas[sigmas > 0.0], self._motion.speed)
         self._replay(i)
-
-    def _sure_for(self, P: Array, t: int, kind: Kind) -> float | None:
-        """Seconds since the last accepted fix, of a foot that knows its place so well that others must insist.
-
-        A blob never makes a tag insist.
-        """
-        by = [self._fix_t[k] for k in (("marker",) if kind == "marker" else self._fix_t) if k in self._fix_t]
-        if not self.acquired or not by or (t - max(by)) * 1e-9 > SURE_AGE_S:
-            return None
-        return (t - max(by)) * 1e-9 if math.sqrt(max(P[0, 0], P[1, 1], P[2, 2])) < SURE_SIGMA else None
 
     def _restart_from(self, agreed: list[Rejected], fix: OpticalFix) -> None:
         """Begin anew at the oldest of the fixes that agree, and take them all."""
@@ -331,7 +327,6 @@ class InertialFilter:
                 timeline.rows[j, ACCEPTED] = 1.0
         self._replay(i)
         self.acquired = True
-        self._fix_t[fix.kind] = agreed[-1].t
         self._motion.clear()
         self._lock[:] = 0.0
 
@@ -343,6 +338,6 @@ class InertialFilter:
         self._timeline.P[0, range(3, 6), range(3, 6)] += 1.0
         self._memory[:] = 0.0
         self.acquired = False
-        self._clear_candidates()
+        self.doubt.clear()
         self._motion.clear()
         self._samples.forget()

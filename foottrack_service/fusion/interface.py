@@ -6,9 +6,10 @@ shape (3,), quaternions ``[x, y, z, w]`` of shape (4,), in the wire's frames and
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 from foottrack_service.config import Placement
 from foottrack_service.rotations import Array
@@ -36,6 +37,8 @@ class Verdict(StrEnum):
     UNCONFIRMED = "unconfirmed"
     UNUSED = "unused"
     INVALID = "invalid"
+    IDENTITY = "identity"
+    """It shows the other foot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +105,19 @@ class FootEstimate:
     """Since the last accepted optical fix, s."""
 
 
+class Target(NamedTuple):
+    """Where a foot's fixes are expected."""
+
+    p: Array
+    """m, stage."""
+    seen: bool
+    """Whether such a fix was accepted there lately."""
+
+
+Whereabouts = Callable[[Kind, int], Target | None]
+"""A foot's ``FootFilter.target``."""
+
+
 class FootFilter(Protocol):
     """One foot's filter."""
 
@@ -129,6 +145,15 @@ class FootFilter(Protocol):
 
     def on_recentred(self, p: Array | None, q: Array | None) -> None:
         """The stage moved by the rigid motion old to new, or by an unknown one (None: re-acquire)."""
+
+    def on_head_lost(self) -> None:
+        """The headset does not know where it is: when it does again, the stage may lie elsewhere."""
+
+    def beside(self, other: Whereabouts) -> None:
+        """There is another foot, and what it knows of itself tells whose a fix is."""
+
+    def target(self, kind: Kind, t: int) -> Target | None:
+        """Where fixes of ``kind`` are expected at ``t``, ns; None while that is not well known."""
 
     def estimate(self, t: int) -> FootEstimate | None:
         """The foot predicted to ``t``; None before anything is known."""

@@ -15,9 +15,10 @@ import numpy as np
 
 from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings
-from foottrack_service.fusion.foot_filter_candidates import Candidates, Rejected
+from foottrack_service.fusion.foot_filter_candidates import Rejected
+from foottrack_service.fusion.foot_filter_doubt import NOT_OURS, Doubt
 from foottrack_service.fusion.foot_filter_optical import CHI_SQUARE_3, implausible
-from foottrack_service.fusion.interface import OpticalFix, Verdict
+from foottrack_service.fusion.interface import Kind, OpticalFix, Verdict, Whereabouts
 from foottrack_service.rotations import Array
 
 MANOEUVRE_S = 0.12
@@ -35,6 +36,8 @@ ATTITUDE_S = 0.04
 """Time constant with which the tag's attitude is smoothed."""
 FURTHEST_TILT = 1.2
 """rad from upright: no foot that one can see from above leans more."""
+KNOWN_S = 0.3
+"""For so long without a fix the place is known well enough to say that another fix is not the other foot's."""
 FORGET_S = 0.5
 """After so long without a fix the place is unknown again."""
 _UP = np.array([0.0, 1.0, 0.0])
@@ -46,11 +49,18 @@ class PicturesOnlyFilter:
     def __init__(self, foot: FootSettings) -> None:
         self._arm = np.array(foot.marker.p)
         self._to_foot = rot.conjugate(np.array(foot.marker.q))
-        self._candidates = Candidates()
+        self.other: Whereabouts = lambda kind, t: None
+        """The other foot's ``target``."""
+        self._doubt = Doubt()
         self.lose()
 
     def lose(self) -> None:
-        """Start again from fixes that agree."""
+        """Nobody knows where the foot is, or where the stage is."""
+        self._doubt.forget()
+        self._start_again()
+
+    def _start_again(self) -> None:
+        """From fixes that agree."""
         self.newest: int | None = None
         """Stamp of the newest accepted fix, ns."""
         self.contact = False
@@ -59,7 +69,6 @@ class PicturesOnlyFilter:
         self._q: Array = rot.IDENTITY
         self._has_attitude = False
         self._seen: deque[tuple[int, Array]] = deque(maxlen=32)
-        self._candidates.clear()
 
     def on_fix(self, fix: OpticalFix) -> Verdict:
         """Take a fix; one that is older than the newest is left out."""
@@ -67,35 +76,35 @@ class PicturesOnlyFilter:
         if reason is not None:
             return reason
         if self.newest is not None and (fix.t - self.newest) * 1e-9 > FORGET_S:
-            self.lose()
+            self._start_again()
         if self.newest is not None and fix.t <= self.newest:
             return Verdict.STALE
         z = fix.head.p + rot.rotate(fix.head.q, fix.p)
         variance = float(np.trace(fix.cov)) / 3.0 + PICTURE_NOISE**2
         attitude = self._attitude(fix)
-        if self.newest is None:
-            agreed = self._candidates.add(Rejected(fix.t, z, z, None, math.sqrt(variance), self._arm), sure_for=None)
+        residual = np.full(3, np.inf)
+        if self.newest is not None:
+            dt = (fix.t - self.newest) * 1e-9
+            state, P = _stepped(self._state, self._P, dt)
+            residual = z - state[0]
+        if float(residual @ residual) > NOT_OURS**2 and self._doubt.is_others(
+            fix.t, z, residual, self.other(fix.kind, fix.t)
+        ):
+            return Verdict.IDENTITY
+        if self.newest is None or float(residual @ residual) > CHI_SQUARE_3 * (P[0, 0] + variance):
+            off = z if self.newest is None else residual
+            rejected = Rejected(fix.t, z, off, None, math.sqrt(variance), self._arm)
+            agreed = self._doubt.agreed(rejected, fix.kind, None, 0.0)
             if agreed is None:
-                return Verdict.UNCONFIRMED
+                return Verdict.UNCONFIRMED if self.newest is None else Verdict.GATE
+            self._start_again()
             self._begin(agreed, variance, attitude)
             return Verdict.ACCEPTED
-        dt = (fix.t - self.newest) * 1e-9
-        state, P = _stepped(self._state, self._P, dt)
-        residual = z - state[0]
-        if float(residual @ residual) > CHI_SQUARE_3 * (P[0, 0] + variance):
-            agreed = self._candidates.add(
-                Rejected(fix.t, z, residual, None, math.sqrt(variance), self._arm), sure_for=None
-            )
-            if agreed is None:
-                return Verdict.GATE
-            self.lose()
-            self._begin(agreed, variance, attitude)
-            return Verdict.ACCEPTED
-        self._candidates.clear()
         self._state, self._P = _updated(state, P, 0, residual, variance)
         self.newest = fix.t
         self._turn(attitude, dt)
         self._stand(fix.t, z)
+        self._doubt.accept(fix.t, fix.kind, 0.0, moving=True)
         return Verdict.ACCEPTED
 
     def move(self, p: Array, q: Array) -> None:
@@ -104,7 +113,14 @@ class PicturesOnlyFilter:
         self._state[0] += p
         self._q = rot.multiply(q, self._q)
         self._seen = deque(((t, p + rot.rotate(q, z)) for t, z in self._seen), maxlen=32)
-        self._candidates.clear()
+        self._doubt.moved(p, q)
+
+    def target(self, kind: Kind, t: int) -> Array | None:
+        """Where in the stage the tag is expected at ``t``, m; None when it was not seen lately."""
+        if self.newest is None or (t - self.newest) * 1e-9 > KNOWN_S:
+            return None
+        place: Array = _stepped(self._state, self._P, max((t - self.newest) * 1e-9, 0.0))[0][0]
+        return place
 
     def predicted(self, t: int) -> tuple[Array, Array, Array, float]:
         """Ankle (m), attitude, velocity (m/s) and SD of the ankle per axis (m) at ``t``, ns; needs a fix before."""
@@ -164,8 +180,8 @@ class PicturesOnlyFilter:
         slope = times @ np.array([s[1] for s in self._seen]) / (times @ times)
         if float(np.linalg.norm(slope)) < STANDING_SPEED:
             self.contact = True
-            for axis, value in ((1, -self._state[1]), (2, -self._state[2])):
-                self._state, self._P = _updated(self._state, self._P, axis, value, STANDING_SIGMA**2)
+            for row in (1, 2):
+                self._state, self._P = _updated(self._state, self._P, row, -self._state[row], STANDING_SIGMA**2)
 
 
 def _stepped(state: Array, P: Array, dt: float) -> tuple[Array, Array]:

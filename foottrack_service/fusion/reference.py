@@ -24,7 +24,7 @@ from foottrack_protocol.messages import Side
 from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings, Placement
 from foottrack_service.fusion.attitude import Attitude
-from foottrack_service.fusion.interface import FootEstimate, ImuSample, OpticalFix, Verdict
+from foottrack_service.fusion.interface import FootEstimate, ImuSample, Kind, OpticalFix, Target, Verdict, Whereabouts
 from foottrack_service.fusion.ladder import BALL_68_OF_ONE_AXIS, Ladder
 from foottrack_service.rotations import Array
 
@@ -210,6 +210,16 @@ class ReferenceFilter:
         self._kinematics.move(p, q)
         if self._average is not None:
             self._average = p + rot.rotate(q, self._average)
+
+    def on_head_lost(self) -> None:
+        """Makes no difference here."""
+
+    def beside(self, other: Whereabouts) -> None:
+        """Nothing is gated here: whoever is called left is the left foot."""
+
+    def target(self, kind: Kind, t: int) -> Target | None:
+        """Never well known."""
+        return None
 
     def estimate(self, t: int) -> FootEstimate | None:
         """Predict to ``t``, average at 90 Hz, and give the average."""
