@@ -17,7 +17,8 @@ from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings
 from foottrack_service.fusion.foot_filter_candidates import Rejected
 from foottrack_service.fusion.foot_filter_doubt import NOT_OURS, Doubt
-from foottrack_service.fusion.foot_filter_optical import CHI_SQUARE_3, implausible
+from foottrack_service.fusion.foot_filter_optical import CHI_SQUARE_3, Blob, implausible
+from foottrack_service.fusion.foot_filter_output import COASTING_DECAY_S
 from foottrack_service.fusion.interface import Kind, OpticalFix, Verdict, Whereabouts
 from foottrack_service.rotations import Array
 
@@ -34,10 +35,16 @@ PICTURE_NOISE = 0.002
 """m per axis beyond what the camera says: head pose and mount."""
 ATTITUDE_S = 0.04
 """Time constant with which the tag's attitude is smoothed."""
+FLAT_TILT = 0.35
+"""rad: a standing foot whose tag leans by less stands flat."""
 FURTHEST_TILT = 1.2
 """rad from upright: no foot that one can see from above leans more."""
 KNOWN_S = 0.3
 """For so long without a fix the place is known well enough to say that another fix is not the other foot's."""
+FURTHEST_AT_ONCE = 0.3
+"""m: what is further from where the foot is expected must be confirmed, however unsure that is."""
+LATE_S = 0.06
+"""So old the newest picture is at most while the foot is in sight."""
 FORGET_S = 0.5
 """After so long without a fix the place is unknown again."""
 _UP = np.array([0.0, 1.0, 0.0])
@@ -47,7 +54,7 @@ class PicturesOnlyFilter:
     """One foot's fixes, in order. Times in ns, vectors in the stage."""
 
     def __init__(self, foot: FootSettings) -> None:
-        self._arm = np.array(foot.marker.p)
+        self._arm, self._blob = np.array(foot.marker.p), Blob(foot)
         self._to_foot = rot.conjugate(np.array(foot.marker.q))
         self.other: Whereabouts = lambda kind, t: None
         """The other foot's ``target``."""
@@ -79,21 +86,20 @@ class PicturesOnlyFilter:
             self._start_again()
         if self.newest is not None and fix.t <= self.newest:
             return Verdict.STALE
-        z = fix.head.p + rot.rotate(fix.head.q, fix.p)
         variance = float(np.trace(fix.cov)) / 3.0 + PICTURE_NOISE**2
         attitude = self._attitude(fix)
-        residual = np.full(3, np.inf)
-        if self.newest is not None:
-            dt = (fix.t - self.newest) * 1e-9
-            state, P = _stepped(self._state, self._P, dt)
-            residual = z - state[0]
-        if float(residual @ residual) > NOT_OURS**2 and self._doubt.is_others(
-            fix.t, z, residual, self.other(fix.kind, fix.t)
-        ):
+        z = fix.head.p + rot.rotate(fix.head.q, fix.p)
+        if fix.kind == "depth":
+            z = z + rot.rotate(self._q if attitude is None else attitude, self._arm - self._blob.point)
+            variance += self._blob.sigma**2
+        dt = 0.0 if self.newest is None else (fix.t - self.newest) * 1e-9
+        state, P = _stepped(self._state, self._P, dt)
+        residual = z - state[0]
+        off = math.inf if self.newest is None else float(residual @ residual)
+        if off > NOT_OURS**2 and self._doubt.is_others(fix.t, z, residual, self.other(fix.kind, fix.t)):
             return Verdict.IDENTITY
-        if self.newest is None or float(residual @ residual) > CHI_SQUARE_3 * (P[0, 0] + variance):
-            off = z if self.newest is None else residual
-            rejected = Rejected(fix.t, z, off, None, math.sqrt(variance), self._arm)
+        if off > min(CHI_SQUARE_3 * (P[0, 0] + variance), FURTHEST_AT_ONCE**2):
+            rejected = Rejected(fix.t, z, z if self.newest is None else residual, None, math.sqrt(variance), self._arm)
             agreed = self._doubt.agreed(rejected, fix.kind, None, 0.0)
             if agreed is None:
                 return Verdict.UNCONFIRMED if self.newest is None else Verdict.GATE
@@ -125,7 +131,11 @@ class PicturesOnlyFilter:
     def predicted(self, t: int) -> tuple[Array, Array, Array, float]:
         """Ankle (m), attitude, velocity (m/s) and SD of the ankle per axis (m) at ``t``, ns; needs a fix before."""
         dt = 0.0 if self.newest is None else (t - self.newest) * 1e-9
-        state, P = _stepped(self._state, self._P, min(max(dt, 0.0), 0.5))
+        _, P = _stepped(self._state, self._P, min(max(dt, 0.0), FORGET_S))
+        # A foot that is not seen any more lands sooner than it flies on.
+        coast = max(dt - LATE_S, 0.0)
+        flown = min(max(dt, 0.0), LATE_S) + COASTING_DECAY_S * (1.0 - math.exp(-coast / COASTING_DECAY_S))
+        state, _ = _stepped(self._state, self._P, flown)
         if self.contact:
             state[0], state[1] = self._state[0], 0.0
         ankle = state[0] - rot.rotate(self._q, self._arm)
@@ -147,7 +157,7 @@ class PicturesOnlyFilter:
             for q in (fix.q, fix.q_alt)
             if q is not None and np.isfinite(q).all() and np.any(q != 0.0)
         ]
-        if self._has_attitude:
+        if self._has_attitude and not self.contact:
             found.sort(key=lambda q: float(rot.angle_between(q, self._q)))
         else:
             found.sort(key=lambda q: -float(rot.rotate(q, _UP)[1]))
@@ -156,6 +166,9 @@ class PicturesOnlyFilter:
                 return None
             # Without any tag the toes point to where the head looks.
             return rot.from_yaw(float(rot.yaw_of(fix.head.q)))
+        if self.contact and rot.rotate(found[0], _UP)[1] > math.cos(FLAT_TILT):
+            # A small tag that faces the camera tells its turn well and its tilt badly.
+            return rot.twist_about_up(found[0])
         return found[0]
 
     def _turn(self, attitude: Array | None, dt: float) -> None:
