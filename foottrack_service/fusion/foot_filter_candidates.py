@@ -45,6 +45,8 @@ FEW = 3
 """So many that agree start a foot whose place is unknown."""
 SURE_SPAN_S = 0.3
 """A foot that knows its place is overruled only by fixes that agree for so long, with none accepted between."""
+LOOK_S = 0.1
+"""Who must insist for seconds is asked so often: each time costs a millisecond or two."""
 SLACK = 0.012
 """m: fixes that agree do so within this and three sigma, along a straight drift."""
 FASTEST = 4.0
@@ -105,7 +107,10 @@ class Candidates:
 
     def _insisting(self) -> list[Rejected]:
         """Those that have agreed for SURE_SPAN_S by now; empty when they have not. Notes since when they do."""
-        agreeing, t = self._agreeing(2.0 * SURE_SPAN_S, SURE_FASTEST, TURN_SLACK), self._kept[-1].t
+        t = self._kept[-1].t
+        if self._insists is not None and 0 <= t - self._insists[1] < LOOK_S * 1e9:
+            return []
+        agreeing = self._agreeing(2.0 * SURE_SPAN_S, SURE_FASTEST, TURN_SLACK)
         if self._insists is not None and not 0 <= t - self._insists[1] <= 2e9 * SURE_SPAN_S:
             self._insists = None
         if len(agreeing) <= FEW or t - agreeing[0].t < SURE_SPAN_S * 1e9:

@@ -93,9 +93,9 @@ class Doubt:
             self._fix_t[kind] = found[-1].t
         return found
 
-    def is_others(self, t: int, point: Array, residual: Array, other: Target | None) -> bool:
+    def is_others(self, t: int, point: Array, residual: Array, unrest: float, other: Target | None) -> bool:
         """Whether a fix shows the other foot's target, which is known to be at ``other``."""
-        if other is None:
+        if other is None or self._was_here(point, 0.0, unrest):
             return False
         gap = float(np.linalg.norm(point - other.p))
         if gap > TAKEN or gap > float(np.linalg.norm(residual)):
@@ -108,13 +108,13 @@ class Doubt:
     def _insist_s(self, rejected: Rejected, unrest: float) -> float | None:
         """How long fixes such as this one must insist, 0.0: as always; None: a few are enough."""
         slack = 3.0 * rejected.sigma
-        if self._before is not None:
-            place, at = self._before
-            gap = float(np.linalg.norm(rejected.point - place))
-            if unrest - at < SETTLES_S and gap < SAME_PLACE + slack:
-                return None
+        if self._was_here(rejected.point, slack, unrest):
+            return None
         far = float(np.linalg.norm(rejected.residual)) > FAR + slack
-        return self._lasting_s if far and self._certain(unrest) else 0.0
+        if not far or not self._certain(unrest) or self._taken_since is not None:
+            # One that was taken for the other foot's for so long has insisted already.
+            return 0.0
+        return self._lasting_s
 
     def _sure_for(self, sigma: float, t: int, kind: Kind) -> float | None:
         """Seconds since the last accepted fix, of a foot that knows its place so well that others must insist.
@@ -124,6 +124,13 @@ class Doubt:
         by = [self._fix_t[k] for k in (("marker",) if kind == "marker" else self._fix_t) if k in self._fix_t]
         age = (t - max(by)) * 1e-9 if by else math.inf
         return age if age <= SURE_AGE_S and sigma < SURE_SIGMA else None
+
+    def _was_here(self, point: Array, slack: float, unrest: float) -> bool:
+        """Whether a foot that has rested since was held to be there before it was overruled."""
+        if self._before is None:
+            return False
+        place, at = self._before
+        return unrest - at < SETTLES_S and float(np.linalg.norm(point - place)) < SAME_PLACE + slack
 
     @property
     def _lasting_s(self) -> float:

@@ -168,9 +168,11 @@ class InertialFilter:
             self.acquired = False
         good = ours and place <= CHI_SQUARE_3 and turned_by <= CHI_SQUARE_1
         point, off = row[POINT : POINT + 3].copy(), np.array(residual)
-        if float(off @ off) > NOT_OURS**2 and self.doubt.is_others(t, point, off, self.other(fix.kind, fix.t)):
-            self._replay(i)
-            return Verdict.IDENTITY
+        if float(off @ off) > NOT_OURS**2:
+            other = self.other(fix.kind, fix.t)
+            if self.doubt.is_others(t, point, off, self._memory[UNREST], other):
+                self._replay(i)
+                return Verdict.IDENTITY
         if self.acquired and good:
             self._accept(i, t, fix.kind)
             return Verdict.ACCEPTED

@@ -96,7 +96,7 @@ class PicturesOnlyFilter:
         state, P = _stepped(self._state, self._P, dt)
         residual = z - state[0]
         off = math.inf if self.newest is None else float(residual @ residual)
-        if off > NOT_OURS**2 and self._doubt.is_others(fix.t, z, residual, self.other(fix.kind, fix.t)):
+        if off > NOT_OURS**2 and self._doubt.is_others(fix.t, z, residual, 0.0, self.other(fix.kind, fix.t)):
             return Verdict.IDENTITY
         if off > min(CHI_SQUARE_3 * (P[0, 0] + variance), FURTHEST_AT_ONCE**2):
             rejected = Rejected(fix.t, z, z if self.newest is None else residual, None, math.sqrt(variance), self._arm)
