@@ -50,16 +50,16 @@ class Doubt:
 
     def accept(self, t: int, kind: Kind, unrest: float, moving: bool) -> None:
         """A fix of ``t`` was accepted; ``moving``: the accepted ones show that the foot moves."""
+        self._candidates["depth"].clear()
+        self._fix_t[kind] = t
+        self._taken_since = None
         if kind == "marker":
-            # However long blobs have agreed, a tag that does not is right soon.
+            # However long blobs have agreed, a tag that does not is right soon; and blobs wander.
             if self._accepted is not None:
                 self._known_s += min(max((t - self._accepted) * 1e-9, 0.0), _LONGEST_STEP_S)
             self._accepted = t
             self._candidates["marker"].clear()
-        self._candidates["depth"].clear()
-        self._fix_t[kind] = t
-        self._taken_since = None
-        self._rested_at = -math.inf if moving else unrest
+            self._rested_at = -math.inf if moving else unrest
 
     def clear(self) -> None:
         """Fixes that were not believed say nothing any more."""
