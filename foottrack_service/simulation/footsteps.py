@@ -7,7 +7,7 @@ acceleration of the turning foot, so the specific force is continuous throughout
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -81,6 +81,33 @@ class Step:
         return self.strike + self.style.settle
 
 
+class Moment(NamedTuple):
+    """One foot at instants (n,): ankle (n, 3) m, yaw and pitch (n,) rad as in `FootSamples`, and whether
+    heel and forefoot stand (n,)."""
+
+    p: Array
+    yaw: Array
+    pitch: Array
+    heel: Flags
+    toe: Flags
+
+
+@dataclass(frozen=True)
+class Strides:
+    """Many steps of one foot that something else moves, from standing at one place to standing at another."""
+
+    heel_off: float
+    """s."""
+    flat: float
+    """s."""
+    place: Place
+    """Where the foot stands at last."""
+    strikes: Array
+    flats: Array
+    at: Callable[[Array], Moment]
+    """What the foot does at instants from `heel_off` to `flat`, (n,) s."""
+
+
 @dataclass
 class FootSamples:
     """A foot on the truth's grid, before it becomes a track."""
@@ -112,7 +139,7 @@ def standing(t: Array, place: Place, sole: Sole) -> FootSamples:
     return FootSamples(t, p, np.full(n, place.yaw), np.zeros(n), still, still.copy(), none, none)
 
 
-def stepping(t: Array, place: Place, steps: Sequence[Step], sole: Sole) -> FootSamples:
+def stepping(t: Array, place: Place, steps: Sequence[Step | Strides], sole: Sole) -> FootSamples:
     """A foot that stands at `place` and takes `steps` on times `t` (n,), s.
 
     Raises ValueError when a step's heel rises before the last one is flat.
@@ -122,11 +149,23 @@ def stepping(t: Array, place: Place, steps: Sequence[Step], sole: Sole) -> FootS
     for step in steps:
         if step.heel_off < last:
             raise ValueError(f"the heel rises at {step.heel_off:.3f} s, before the foot is flat at {last:.3f} s")
-        _take(foot, place, step, sole)
+        if isinstance(step, Strides):
+            _follow(foot, step, sole)
+        else:
+            _take(foot, place, step, sole)
         place, last = step.place, step.flat
-    foot.strikes = np.array([step.strike for step in steps])
-    foot.flats = np.array([step.flat for step in steps])
+    foot.strikes = np.concatenate([s.strikes if isinstance(s, Strides) else [s.strike] for s in steps] or [[]])
+    foot.flats = np.concatenate([s.flats if isinstance(s, Strides) else [s.flat] for s in steps] or [[]])
     return foot
+
+
+def _follow(foot: FootSamples, strides: Strides, sole: Sole) -> None:
+    during = (foot.t >= strides.heel_off) & (foot.t < strides.flat)
+    moment = strides.at(foot.t[during])
+    foot.p[during], foot.yaw[during], foot.pitch[during] = moment.p, moment.yaw, moment.pitch
+    foot.heel[during], foot.toe[during] = moment.heel, moment.toe
+    after, place = foot.t >= strides.flat, strides.place
+    foot.p[after], foot.yaw[after] = [place.x, sole.ankle_height, place.z], place.yaw
 
 
 def _take(foot: FootSamples, old: Place, step: Step, sole: Sole) -> None:

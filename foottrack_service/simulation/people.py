@@ -1,4 +1,8 @@
-"""Tasks of a person who wears the sensors. Every function: (seconds, settings, feet, random) to Truth."""
+"""Tasks of a person who wears the sensors. Every function: (seconds, settings, feet, random) to Truth.
+
+Who walks somewhere walks as the walk cycle does (`bouts`); single steps, turns on the spot and walking in place are
+planned here step by step.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +14,19 @@ from foottrack_protocol.messages import Side
 from foottrack_service.config import Settings
 from foottrack_service.simulation import footwear
 from foottrack_service.simulation.anatomy import person, sole
+from foottrack_service.simulation.bouts import FREE, STANCE_WIDTH, Pace
 from foottrack_service.simulation.easing import there_and_back
 from foottrack_service.simulation.footsteps import Place, stepping
 from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.posture import Bearing, Extra, carried
-from foottrack_service.simulation.stride import (
-    CAUTIOUS,
-    IN_PLACE,
-    STANCE_WIDTH,
-    WALKING,
-    WALKING_WIDTH,
-    Planner,
-)
+from foottrack_service.simulation.stride import CAUTIOUS, IN_PLACE, Planner
 from foottrack_service.simulation.truth import FootTrack, Truth, grid
+from foottrack_service.walkcycle import path as paths
+
+_LINE_PACE, _CIRCLE_PACE = Pace(0.50, 0.8, STANCE_WIDTH), Pace(0.45, 0.8, STANCE_WIDTH)
+"""In a room, with a headset on."""
+_S_BEND = 0.25
+"""Width of the S over its length: turns of about 40 deg to either side."""
 
 
 def head_moving(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
@@ -45,7 +49,7 @@ def line(seconds: float, settings: Settings, feet: Feet, random: np.random.Gener
     """2 m ahead, a turn, and back."""
     plan = Planner(random)
     while plan.now < seconds - 6.0:
-        plan.walk(2.0, 0.5, CAUTIOUS, 0.8, STANCE_WIDTH)
+        plan.walk(paths.line(2.0), _LINE_PACE, settings)
         plan.stand(0.6)
         plan.turn(math.pi, CAUTIOUS, 0.8)
         plan.stand(0.8)
@@ -58,7 +62,7 @@ def circle(seconds: float, settings: Settings, feet: Feet, random: np.random.Gen
     direction = 1.0
     while plan.now < seconds - 3.0:
         angle = min(2.0 * math.pi, 0.45 * (seconds - plan.now - 2.0) / 0.8)
-        plan.arc(1.0, direction * angle, 0.45, CAUTIOUS, 0.8)
+        plan.walk(paths.circle(1.0, direction * math.degrees(angle)), _CIRCLE_PACE, settings)
         plan.stand(1.0)
         direction = -direction
     return scene(seconds, settings, feet, random, plan, Bearing())
@@ -113,11 +117,19 @@ def walk(seconds: float, settings: Settings, feet: Feet, random: np.random.Gener
     plan = Planner(random)
     while plan.now < seconds - 5.0:
         distance = min(8.0, 0.7 * max(2.0, round((seconds - plan.now - 2.0) / 0.55)))
-        plan.walk(distance, 0.70, WALKING, 0.55, WALKING_WIDTH)
+        plan.walk(paths.line(distance), FREE, settings)
         plan.stand(0.8)
         if plan.now < seconds - 6.0:
             plan.turn(math.pi, CAUTIOUS, 0.8)
             plan.stand(0.8)
+    return scene(seconds, settings, feet, random, plan, Bearing())
+
+
+def s_walk(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """A normal walk along an S, from standing to standing."""
+    plan = Planner(random)
+    length = max(4.0, 1.5 * seconds)
+    plan.walk(paths.s_curve(length, _S_BEND * length), FREE, settings, max(seconds - 2.0, 3.0))
     return scene(seconds, settings, feet, random, plan, Bearing())
 
 
@@ -136,7 +148,7 @@ def scene(
         side: stepping(t, plan.start[side], plan.steps[side], sole(settings.feet.of(side))) for side in plan.start
     }
     wearer = person(settings.body, settings.feet.left.ankle_height)
-    head, hips = carried(samples["left"], samples["right"], wearer, bearing, extra, random)
+    head, hips = carried(samples["left"], samples["right"], wearer, bearing, extra, random, plan.bouts)
     tracks: dict[Side, FootTrack] = {
         side: footwear.track(foot, sole(settings.feet.of(side)), feet, random) for side, foot in samples.items()
     }

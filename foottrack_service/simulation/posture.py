@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
@@ -11,6 +12,8 @@ from foottrack_service import rotations
 from foottrack_service.rotations import Array
 from foottrack_service.simulation import noise
 from foottrack_service.simulation.anatomy import EYES_FROM_NECK, Person
+from foottrack_service.simulation.bouts import Bout, Carriage
+from foottrack_service.simulation.easing import ease
 from foottrack_service.simulation.footsteps import FootSamples
 from foottrack_service.simulation.truth import GRID_HZ, Track
 
@@ -20,6 +23,9 @@ _HIPS_AHEAD = 0.03
 """m: standing, the hips are a little before the ankles."""
 _SWAY_SHARE = 0.25
 """How much of the way to the standing foot the hips go: about 2 cm to each side in a walk."""
+
+_FADE_S = 0.4
+"""From standing to walking, and back: what stands is carried a little differently."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +53,15 @@ class Extra:
 
 
 def carried(
-    left: FootSamples, right: FootSamples, person: Person, bearing: Bearing, extra: Extra, random: np.random.Generator
+    left: FootSamples,
+    right: FootSamples,
+    person: Person,
+    bearing: Bearing,
+    extra: Extra,
+    random: np.random.Generator,
+    bouts: Sequence[Bout] = (),
 ) -> tuple[Track, Track]:
-    """Tracks of head and hips over these feet."""
+    """Tracks of head and hips over these feet; in `bouts` the walk cycle carries them."""
     t = left.t
     n = len(t)
     yaw = _smooth(0.5 * (left.yaw + right.yaw), 0.3)
@@ -61,22 +73,38 @@ def carried(
     standing = person.hip_height - np.asarray(extra.crouch) + 0.1 * (sway[:, 1] - 2.0 * bearing.sway_sd)
     hips[:, 1] = _height(hips, left, right, facing, person, standing)
 
-    gaze = noise.wander(random, n, GRID_HZ, bearing.gaze_band_hz, bearing.gaze_sd)
-    turn = yaw + np.asarray(extra.yaw) + gaze[:, 1]
-    head_q = rotations.multiply(
-        rotations.from_yaw(turn),
-        rotations.multiply(
-            rotations.from_axis_angle([1.0, 0.0, 0.0], gaze[:, 0] - bearing.look_down),
-            rotations.from_axis_angle([0.0, 0.0, 1.0], 0.5 * gaze[:, 2]),
-        ),
-    )
     lean = np.broadcast_to(np.asarray(extra.lean, dtype=np.float64), n)
     drop = person.neck_above_hips - np.sqrt(person.neck_above_hips**2 - lean**2)
     towards = rotations.from_yaw(yaw + np.asarray(extra.yaw))
     neck = hips + rotations.rotate(towards, np.stack([np.zeros(n), -drop, -lean], axis=-1))
     neck[:, 1] += person.neck_above_hips
+    for bout in bouts:
+        share = ease((t - bout.start + _FADE_S) / _FADE_S) * ease((bout.end + _FADE_S - t) / _FADE_S)
+        here = share > 0.0
+        walks, part = _calmed(bout.carriage(t[here])), share[here]
+        hips[here] += part[:, None] * (walks.hips - hips[here])
+        neck[here] += part[:, None] * (walks.neck + sway[here] * [1.0, 0.0, 1.0] - neck[here])
+        facing[here] = rotations.slerp(facing[here], walks.hips_q, part)
+        towards[here] = rotations.slerp(towards[here], walks.head_q, part)
+
+    gaze = noise.wander(random, n, GRID_HZ, bearing.gaze_band_hz, bearing.gaze_sd)
+    looking = rotations.multiply(
+        rotations.from_yaw(gaze[:, 1]),
+        rotations.multiply(
+            rotations.from_axis_angle([1.0, 0.0, 0.0], gaze[:, 0] - bearing.look_down),
+            rotations.from_axis_angle([0.0, 0.0, 1.0], 0.5 * gaze[:, 2]),
+        ),
+    )
+    head_q = rotations.multiply(towards, looking)
     head = neck + rotations.rotate(head_q, EYES_FROM_NECK)
     return Track(t, head, head_q), Track(t, hips, facing)
+
+
+def _calmed(walks: Carriage) -> Carriage:
+    """A key-framed pelvis drops and surges harder than a body of 70 kg can: the same below it, and smoothly."""
+    hips = _smooth(walks.hips, 0.04)
+    hips[:, 1] = _smooth(minimum_filter1d(walks.hips[:, 1], round(0.12 * GRID_HZ)), 0.04)
+    return replace(walks, hips=hips, neck=walks.neck + hips - walks.hips)
 
 
 def _hips(left: FootSamples, right: FootSamples, facing: Array, bearing: Bearing, person: Person) -> Array:

@@ -1,4 +1,4 @@
-"""Plans of steps: a person who stands, steps, walks and turns, one foot at a time."""
+"""Plans of steps: a person who stands, steps and turns, one foot at a time, and walks in between."""
 
 from __future__ import annotations
 
@@ -8,19 +8,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from foottrack_protocol.messages import Side
-from foottrack_service.simulation.footsteps import Place, Step, Style
+from foottrack_service.config import Settings
+from foottrack_service.simulation.bouts import STANCE_WIDTH, Bout, Pace, between, walked
+from foottrack_service.simulation.footsteps import Place, Step, Strides, Style
+from foottrack_service.simulation.truth import BOTH
+from foottrack_service.walkcycle.path import Path
 
 CAUTIOUS = Style(swing=0.55, roll=0.25, settle=0.12, toe_off_pitch=0.5, toe_off_rate=1.5, strike_pitch=-0.15, lift=0.06)
 """Single steps in a room, with a headset on."""
-WALKING = Style(swing=0.44, roll=0.28, settle=0.09, toe_off_pitch=0.95, toe_off_rate=4.0, strike_pitch=-0.35, lift=0.05)
-"""A free walk: swing 40 % of 1.10 s; the heel's rise and the pitch at the strike as in Winter's foot angles."""
 IN_PLACE = Style(swing=0.42, roll=0.14, settle=0.08, toe_off_pitch=0.45, toe_off_rate=2.0, strike_pitch=0.0, lift=0.12)
 """Walking in place: the foot comes down flat."""
-
-STANCE_WIDTH = 0.22
-"""m between the ankles, at ease."""
-WALKING_WIDTH = 0.13
-"""m between the ankles in a walk."""
 
 
 @dataclass
@@ -35,8 +32,9 @@ class Planner:
             "right": Place(0.5 * STANCE_WIDTH, 0.0, 0.0),
         }
     )
-    steps: dict[Side, list[Step]] = field(default_factory=lambda: {"left": [], "right": []})
+    steps: dict[Side, list[Step | Strides]] = field(default_factory=lambda: {"left": [], "right": []})
     start: dict[Side, Place] = field(init=False)
+    bouts: list[Bout] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.start = dict(self.feet)
@@ -54,32 +52,26 @@ class Planner:
         self.feet[side] = place
         self.now = start + interval * (1.0 + 0.03 * float(np.clip(self.random.standard_normal(), -2.0, 2.0)))
 
-    def walk(self, distance: float, length: float, style: Style, interval: float, width: float) -> None:
-        """Straight ahead by `distance` m in steps of at most `length` m, the last foot joining the first."""
-        middle = self.middle()
-        count = max(1, math.ceil(distance / length - 1e-9))
-        first: Side = "left" if self.random.random() < 0.5 else "right"
-        for index in range(count + 1):
-            side: Side = first if index % 2 == 0 else other(first)
-            gone = distance * min(index + 1, count) / count
-            last = index >= count - 1
-            self.step(side, middle.ahead(gone, _right(side, STANCE_WIDTH if last else width)), style, interval)
-
-    def arc(self, radius: float, angle: float, length: float, style: Style, interval: float) -> None:
-        """Along a circle to the left (`angle` rad, positive) or right, in steps of at most `length` m."""
-        middle = self.middle()
-        side_of_centre = math.copysign(radius, angle)
-        centre = middle.ahead(0.0, -side_of_centre)
-        count = max(1, math.ceil(abs(angle) * radius / length))
-        first: Side = "left" if angle > 0.0 else "right"
-        for index in range(count + 1):
-            side: Side = first if index % 2 == 0 else other(first)
-            turned = centre.ahead(0.0, 0.0, angle * min(index + 1, count) / count)
-            self.step(side, turned.ahead(0.0, side_of_centre + _right(side, STANCE_WIDTH)), style, interval)
+    def walk(self, path: Path, pace: Pace, settings: Settings, seconds: float | None = None) -> None:
+        """Along `path`, which begins here and ahead, all of it or for `seconds`; the feet end side by side."""
+        taken = {side: self.steps[side][-1].place if self.steps[side] else self.start[side] for side in BOTH}
+        start = max([self.now, *(self.steps[side][-1].flat for side in BOTH if self.steps[side])])
+        bout = walked(path.moved(*between(taken)), pace, start, taken, settings, self.random, seconds)
+        for side in BOTH:
+            self.steps[side].append(bout.strides(side))
+            self.feet[side] = self.steps[side][-1].place
+        self.bouts.append(bout)
+        self.now = bout.end
 
     def turn(self, angle: float, style: Style, interval: float) -> None:
         """On the spot by `angle` rad (positive to the left), at most 50 deg a step."""
-        self.arc(1e-9, angle, 1e-9 * math.radians(50.0), style, interval)
+        middle = self.middle()
+        count = max(1, math.ceil(abs(angle) / math.radians(50.0)))
+        first: Side = "left" if angle > 0.0 else "right"
+        for index in range(count + 1):
+            side: Side = first if index % 2 == 0 else other(first)
+            turned = middle.ahead(0.0, 0.0, angle * min(index + 1, count) / count)
+            self.step(side, turned.ahead(0.0, STANCE_WIDTH * (-0.5 if side == "left" else 0.5)), style, interval)
 
     def middle(self) -> Place:
         """Between the feet."""
@@ -104,7 +96,3 @@ class Planner:
 def other(side: Side) -> Side:
     """The other side."""
     return "right" if side == "left" else "left"
-
-
-def _right(side: Side, width: float) -> float:
-    return -0.5 * width if side == "left" else 0.5 * width

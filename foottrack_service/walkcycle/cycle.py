@@ -61,17 +61,19 @@ def build_cycle(project: Project, body: Humanoid | None = None) -> Cycle:
     Raises ProjectError and ReachError; both name the pose.
     """
     body = body or Humanoid(project.height)
-    ratio = body.height / project.height
+    posed = Humanoid(project.height)
+    ratio = body.leg / posed.leg
     keys = sorted(full_cycle(project).keys, key=lambda key: key.phase)
     for key in keys:
-        _check_reach(Humanoid(project.height), key)
+        _check_reach(posed, key)
     phases = np.array([key.phase for key in keys])
     hips = np.array([key.pose.hips for key in keys]) * ratio
+    hips[:, 1] += body.ankle_height - ratio * posed.ankle_height
     feet = {side: [key.pose.left if side == "left" else key.pose.right for key in keys] for side in SIDES}
-    ankles = {side: np.array([foot.ankle for foot in feet[side]]) * ratio for side in SIDES}
+    ankles = {side: _ankles(feet[side], posed, body, ratio) for side in SIDES}
     timing = project.contact
 
-    stride = 2.0 * _contact_step(body, keys[0], ratio)
+    stride = 2.0 * ratio * _contact_step(posed, keys[0])
     if stride < 0.05 * body.leg:
         raise ProjectError(
             f"pose {keys[0].name!r}: the left foot is not in front of the right one (step {0.5 * stride:.3f} m)"
@@ -135,11 +137,19 @@ def _angles(feet: list[FootPose], name: str) -> Array:
     return np.array([getattr(foot, name) for foot in feet], dtype=np.float64)
 
 
-def _contact_step(body: Humanoid, contact: Key, ratio: float) -> float:
+def _ankles(feet: list[FootPose], posed: Humanoid, body: Humanoid, ratio: float) -> Array:
+    """Ankles (k, 3) of the posed body's feet on another body: the legs' length scales the way, the foot its own
+    roll."""
+    ankles, pitch = np.array([foot.ankle for foot in feet]), _angles(feet, "pitch")
+    rolls = planted_ankle(body, pitch) - ratio * planted_ankle(posed, pitch)
+    return np.asarray(ratio * ankles + np.stack([np.zeros(len(feet)), rolls[:, 0], rolls[:, 1]], axis=-1))
+
+
+def _contact_step(body: Humanoid, contact: Key) -> float:
     """Length of the first step: between the two footprints of the contact pose, with the roll taken off."""
     ends = {}
     for side, foot in (("left", contact.pose.left), ("right", contact.pose.right)):
-        ends[side] = foot.ankle[2] * ratio - float(planted_ankle(body, np.array(foot.pitch))[1])
+        ends[side] = foot.ankle[2] - float(planted_ankle(body, np.array(foot.pitch))[1])
     return ends["left"] - ends["right"]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +28,8 @@ class Footprint:
     """One contact of one foot. `place` (x, z) m is the floor below the ankle of the flat foot, `yaw` rad.
     Phases are in cycles of the walk: strike, flat, heel_off, toe_off; a
     foot that stands from the beginning has strike and flat at minus infinity, one that stays has heel_off and toe_off
-    at infinity. `lift` and `land` scale the pitch with which it leaves and with which it arrived.
+    at infinity. `arc` and `aside` (left, +) say in metres where that is on the path. `lift` and `land` scale the pitch
+    with which it leaves and with which it arrived.
     """
 
     side: str
@@ -39,8 +40,17 @@ class Footprint:
     heel_off: float
     toe_off: float
     arc: float
+    aside: float
     lift: float = 1.0
     land: float = 1.0
+
+    def moved(self, path: Path, ahead: float = 0.0, left: float = 0.0, turn: float = 0.0) -> Footprint:
+        """The same contact beside itself, m along and across `path`, and turned, rad."""
+        arc, aside = self.arc + ahead, self.aside + left
+        was, now = path.heading(np.array([self.arc, arc]))
+        x, z = path.offset(np.array([arc]), aside)[0]
+        yaw = self.yaw + float(now - was) + turn
+        return replace(self, place=(float(x), float(z)), yaw=yaw, arc=arc, aside=aside)
 
 
 @dataclass(frozen=True)
@@ -96,6 +106,7 @@ def plan_walk(cycle: Cycle, path: Path, steps: int | None = None, *, start: bool
                 heel_off=np.inf if last else strike + timing.heel_off,
                 toe_off=np.inf if last else strike + timing.toe_off,
                 arc=arc,
+                aside=cycle.stance_x[side],
                 lift=lift,
                 land=land,
             )

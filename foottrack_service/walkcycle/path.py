@@ -39,6 +39,25 @@ class Path:
         side = np.stack([np.cos(yaw), -np.sin(yaw)], axis=-1)
         return np.asarray(self.place(s) + np.asarray(left)[..., None] * side)
 
+    def project(self, point: tuple[float, float], near: float = 0.0) -> tuple[float, float]:
+        """Arc length, and distance to the left (+), m, of a point less far from the path than it bends."""
+        s = np.array([near])
+        for _ in range(60):
+            away = np.asarray(point) - self.place(s)[0]
+            yaw = float(self.heading(s)[0])
+            s = s + away @ [np.sin(yaw), np.cos(yaw)]
+        return float(s[0]), float(away @ [np.cos(yaw), -np.sin(yaw)])
+
+    def moved(self, to: tuple[float, float], yaw: float) -> Path:
+        """The same path from another start: what began at the origin, towards +Z, begins at `to` with heading
+        `yaw` (rad)."""
+        turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+        return Path(
+            self.length,
+            lambda s: np.asarray(self.place(s) @ turn + np.asarray(to)),
+            lambda s: np.asarray(self.heading(s) + yaw),
+        )
+
 
 def line(length: float, degrees: float = 0.0) -> Path:
     """Straight ahead, or at an angle to the left."""

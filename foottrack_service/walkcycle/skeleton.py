@@ -8,6 +8,7 @@ faces -Z, happens in `foottrack_service.walkcycle.wire` and nowhere else.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -58,6 +59,24 @@ _EYES: Final = (0.0, 0.10, 0.09)
 
 
 @dataclass(frozen=True)
+class Measures:
+    """Lengths of one person, m, that are known; None is in proportion to the height."""
+
+    thigh: float | None = None
+    shank: float | None = None
+    hip_width: float | None = None
+    """Between the hip joints."""
+    torso: float | None = None
+    """From the pelvis up to the head's joint."""
+    ankle_height: float | None = None
+    """Above the sole."""
+    heel_behind: float | None = None
+    """Of the ankle."""
+    ball_ahead: float | None = None
+    """The toes' joint ahead of the ankle."""
+
+
+@dataclass(frozen=True)
 class Humanoid:
     """One body: joint offsets at rest (22, 3) and the extra points, all in metres, of a given height.
 
@@ -66,6 +85,7 @@ class Humanoid:
     """
 
     height: float = REST_HEIGHT_M
+    measures: Measures = Measures()
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.height) and 0.3 <= self.height <= 3.0):
@@ -78,11 +98,14 @@ class Humanoid:
 
     @property
     def offsets(self) -> Array:
-        return np.array([offset for _, _, offset in _TREE]) * self.scale
+        return self._offsets.copy()
 
     @property
     def heel(self) -> Array:
-        return np.array(_HEEL) * self.scale
+        x, y, z = np.array(_HEEL) * self.scale
+        known = self.measures
+        height = -y if known.ankle_height is None else known.ankle_height
+        return np.array([x, -height, z if known.heel_behind is None else -known.heel_behind])
 
     @property
     def toe_tip(self) -> Array:
@@ -91,7 +114,7 @@ class Humanoid:
     @property
     def ball(self) -> Array:
         """The toes' joint in the foot's frame: what the foot rolls over."""
-        return np.asarray(self.offsets[INDEX["leftToes"]])
+        return np.asarray(self._offsets[INDEX["leftToes"]])
 
     @property
     def eyes(self) -> Array:
@@ -99,11 +122,11 @@ class Humanoid:
 
     @property
     def thigh(self) -> float:
-        return float(-self.offsets[INDEX["leftLowerLeg"], 1])
+        return float(-self._offsets[INDEX["leftLowerLeg"], 1])
 
     @property
     def shank(self) -> float:
-        return float(-self.offsets[INDEX["leftFoot"], 1])
+        return float(-self._offsets[INDEX["leftFoot"], 1])
 
     @property
     def leg(self) -> float:
@@ -118,6 +141,27 @@ class Humanoid:
     def ball_height(self) -> float:
         """Height of the toes' joint above the sole, m."""
         return float(-self.toe_tip[1])
+
+    @cached_property
+    def _offsets(self) -> Array:
+        offsets = np.array([offset for _, _, offset in _TREE]) * self.scale
+        known = self.measures
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            hip, knee, ankle, ball = (INDEX[side + part] for part in ("UpperLeg", "LowerLeg", "Foot", "Toes"))
+            if known.hip_width is not None:
+                offsets[hip, 0] = 0.5 * sign * known.hip_width
+            if known.thigh is not None:
+                offsets[knee, 1] = -known.thigh
+            if known.shank is not None:
+                offsets[ankle, 1] = -known.shank
+            offsets[ball, 1] = self.ball_height + self.heel[1]
+            if known.ball_ahead is not None:
+                offsets[ball, 2] = known.ball_ahead
+        offsets[0, 1] = -float(self.heel[1] + offsets[INDEX["leftLowerLeg"], 1] + offsets[INDEX["leftFoot"], 1])
+        if known.torso is not None:
+            trunk = [INDEX[name] for name in ("spine", "chest", "upperChest", "neck", "head")]
+            offsets[trunk] *= known.torso / float(np.sum(offsets[trunk, 1]))
+        return offsets
 
 
 def forward_kinematics(offsets: Array, hips: Array, rotations: Array) -> tuple[Array, Array]:

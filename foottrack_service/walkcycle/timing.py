@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,7 +74,8 @@ def make_clock(
         if shares[-1] < 1.0:
             shares, factors = [*shares, 1.0], [*factors, factors[-1]]
     ramp = min(_RAMP_CYCLES, 0.3 * total)
-    steady = np.linspace(start + ramp * from_rest, end - ramp * to_rest, 65)
+    knots = max(65, 8 * math.ceil(total) + 1)
+    steady = np.linspace(start + ramp * from_rest, end - ramp * to_rest, knots)
     rates = PchipInterpolator(np.array(shares) * total + start, factors)(steady) / period
     # Trapezoids: exact for a rate that is linear in time between knots.
     gaps = np.diff(steady) / (0.5 * (rates[1:] + rates[:-1]))

