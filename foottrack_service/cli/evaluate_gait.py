@@ -25,6 +25,7 @@ _ROWS = (
     ("correlation", "avatar's foot with the user's: correlation"),
     ("phase_error_ms", "and phase error, ms"),
     ("max_jump_mm", "largest jump of a target in a frame, mm"),
+    ("max_move_mm", "largest movement in a frame, mm"),
     ("skate_mm", "largest skate of a stance, mm"),
     ("skate_mm_median", "median skate, mm"),
 )

@@ -36,6 +36,8 @@ class ModeFigures:
     walked: int = 0
     """Walks that began (or steps that the reference saw)."""
     jump: float = 0.0
+    move: float = 0.0
+    """Largest jump and largest movement of a target in a frame."""
     skates: list[float] = field(default_factory=list)
     lags: list[float] = field(default_factory=list)
     correlations: list[float] = field(default_factory=list)
@@ -86,7 +88,9 @@ def _figures(run: GaitRun, mode: Mode, scenario: Scenario) -> ModeFigures:
     frames = _own_frames(run, mode)
     for side in SIDES:
         track = scenario.truth.feet[side]
-        out.jump = max(out.jump, float(np.max(metrics.jumps_m(run.t[frames], run.feet[side][frames]), initial=0.0)))
+        shown = run.feet[side][frames]
+        out.jump = max(out.jump, float(np.max(metrics.jumps_m(run.t[frames], shown), initial=0.0)))
+        out.move = max(out.move, float(np.max(np.linalg.norm(np.diff(shown, axis=0), axis=1), initial=0.0)))
         leaves, strikes = _instants(track, scenario.seconds)
         matched = metrics.match(leaves, run.lifted[side], 0.5)
         out.steps += matched.true
@@ -162,6 +166,7 @@ def _pooled(figures: list[tuple[GaitCase, ModeFigures]], mode: Mode) -> dict[str
         "extra": sum(found.extra for found in in_place),
         "false_in_squats": sum(found.extra for case, found in figures if case.kind == "knee-bends"),
         "max_jump_mm": _round(1e3 * max((found.jump for _, found in figures), default=0.0), 1),
+        "max_move_mm": _round(1e3 * max((found.move for _, found in figures), default=0.0), 1),
         "skate_mm": _round(1e3 * float(np.max(skates)), 2) if len(skates) else None,
         "skate_mm_median": _round(1e3 * float(np.median(skates)), 2) if len(skates) else None,
         "phase_error_ms": _round(1e3 * float(np.mean(np.abs(lags))), 1) if len(lags) else None,

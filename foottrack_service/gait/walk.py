@@ -26,15 +26,17 @@ LONGEST_STEP = 0.5
 LEAVES, FARTHEST = 0.52, 0.62
 """Of the leg: who walks fast runs. The avatar's planted foot leaves the floor from the first on, though the user's
 still stands, and goes back no further than the second."""
-_RUNNING_LIFT = 0.05
+_RUNNING_LIFT = 0.03
 """m: how high such a foot is held until the user's follows."""
-_RUNNING_S = 0.03
-"""s: how fast it gets there."""
+_LIFT_STIFFNESS, _SETTLE_STIFFNESS = 90.0, 40.0
+"""1/s: how tightly it is lifted, and comes back from there."""
 _RUNNING_SPEED = 0.3
 """m/s: a slower avatar does not run."""
 _DOWN, _UP = 0.004, 0.03
 """m: a foot below the first stands, above the second it flies free; in between it goes along with the ground."""
-_LANDING_S = 0.05
+_LANDING_S = 0.045
+_GRIP_S = 0.06
+"""s: from flying free to standing, and back, at the soonest."""
 _SPEED_S = 0.15
 """s: how fast the avatar's speed follows the model's."""
 _LAST_BRAKE = 0.4
@@ -46,7 +48,6 @@ _RETURN_LIFT, _LEAST_LIFT, _LARGEST_LIFT = 0.15, 0.02, 0.05
 """A foot returns in a small step, lifted by a share of its way within these m. It does not slide."""
 _NEAR = 0.004
 """m: closer is under the hips."""
-_SETTLE_S = 0.06
 _STIFFNESS = 55.0
 """1/s: how tightly a foot in the air follows its goal. Low steps make much way of little height, and of its noise."""
 _JUMP = 0.02
@@ -62,6 +63,8 @@ class _Leg:
     __slots__ = (
         "down",
         "extra",
+        "extra_rate",
+        "fall",
         "goal",
         "height",
         "origin",
@@ -79,11 +82,12 @@ class _Leg:
     )
 
     def __init__(self) -> None:
-        self.z = self.goal = self.rate = self.target = self.extra = self.height = self.pitch = 0.0
+        self.z = self.goal = self.rate = self.target = self.height = self.pitch = 0.0
+        self.extra = self.extra_rate = 0.0
         self.swinging = self.rising = False
         self.progress = self.share = 0.0
         self.start = self.peak = self.top = 0.0
-        self.origin = 0.0
+        self.origin = self.fall = 0.0
         self.down = 1.0
         """How much the foot goes along with the ground, 0 to 1."""
 
@@ -92,7 +96,7 @@ class _Leg:
         height = foot.height
         if not self.swinging:
             self.swinging = self.rising = True
-            self.progress, self.target = 0.0, plan
+            self.progress, self.target, self.fall = 0.0, plan, 0.0
             self.start = foot.start_height
             self.peak = max(foot.peak or FIRST_PEAK, self.start + 0.02)
         if self.rising and foot.phase != "ascending":
@@ -122,31 +126,31 @@ class _Leg:
 
     def along(self, foot: FootPhases, speed: float, dt: float, leg: float) -> None:
         """Go after the swing's goal, and along with the ground, which moves back at ``speed`` m/s."""
-        way = speed * dt
-        if foot.phase == "stance":
-            runs = _smooth((-self.z / leg - LEAVES) / (FARTHEST - LEAVES)) * min(1.0, speed / _RUNNING_SPEED)
-            if _RUNNING_LIFT * runs > self.extra:
-                self.extra += (_RUNNING_LIFT * runs - self.extra) * (1.0 - math.exp(-dt / _RUNNING_S))
-            wanted = 1.0 - runs
-        else:
-            clear = foot.lift if foot.phase == "ascending" else foot.height
+        runs = _share((-self.z / leg - LEAVES) / (FARTHEST - LEAVES)) * min(1.0, speed / _RUNNING_SPEED)
+        wanted = 1.0 - runs
+        if foot.phase != "stance":
             # A fast landing is met earlier, or the foot would stop within a frame.
-            free = max(_UP, -_LANDING_S * foot.vy)
-            wanted = 1.0 - _smooth((clear - _DOWN) / (free - _DOWN))
-        change = dt / 0.03
+            self.fall = max(self.fall, -foot.vy)
+            free = max(_UP, _LANDING_S * self.fall)
+            clear = (foot.lift if foot.phase == "ascending" else foot.height) + self.extra
+            near = 1.0 - _share((clear - _DOWN) / (free - _DOWN))
+            # It leaves the ground once, and comes back to it once.
+            wanted = min(wanted, min(near, self.down) if foot.phase == "ascending" else max(near, self.down))
+        lift = _RUNNING_LIFT * runs
+        stiffness = _LIFT_STIFFNESS if lift > self.extra else _SETTLE_STIFFNESS
+        self.extra, self.extra_rate = _sprung(self.extra, self.extra_rate, lift, stiffness, dt)
+        change = dt / _GRIP_S
         self.down += min(max(wanted - self.down, -change), change)
         if foot.height + self.extra < _DOWN:
             self.down = 1.0
         if self.down >= 1.0:
             self.goal, self.rate = self.z, 0.0
-        else:  # the exact step of a critically damped spring
-            gap, fade = self.z - self.goal, math.exp(-_STIFFNESS * dt)
-            pull = (self.rate + _STIFFNESS * gap) * dt
-            self.z = self.goal + (gap + pull) * fade
-            self.rate = (self.rate - _STIFFNESS * pull) * fade
-        self.z -= way * self.down
-        self.goal -= way * self.down
-        self.target -= way * self.down
+        grip = _smooth(self.down)
+        z, self.rate = _sprung(self.z, self.rate, self.goal, _STIFFNESS, dt)
+        way = speed * dt * grip
+        self.z += (z - self.z) * (1.0 - grip) - way
+        self.goal -= way
+        self.target -= way
 
 
 class WalkingLegs:
@@ -173,8 +177,6 @@ class WalkingLegs:
                 leg.swing(foot, self._plan(foot, steps, wanted, index))
             else:
                 leg.swinging = False
-            if self._returning != index:
-                leg.extra *= math.exp(-dt / _SETTLE_S)
             leg.along(foot, speed, dt, self._leg)
         self._return(t, dt, feet, steps)
         left, right = (leg.show(foot, dt) for leg, foot in zip(self._legs, feet, strict=True))
@@ -212,8 +214,19 @@ class WalkingLegs:
             self._returning = None
 
 
+def _sprung(at: float, rate: float, goal: float, stiffness: float, dt: float) -> tuple[float, float]:
+    """The exact step of a critically damped spring: place and rate after ``dt`` s; ``stiffness`` 1/s."""
+    gap, fade = at - goal, math.exp(-stiffness * dt)
+    pull = (rate + stiffness * gap) * dt
+    return goal + (gap + pull) * fade, (rate - stiffness * pull) * fade
+
+
+def _share(share: float) -> float:
+    return min(max(share, 0.0), 1.0)
+
+
 def _smooth(share: float) -> float:
-    s = min(max(share, 0.0), 1.0)
+    s = _share(share)
     return s * s * (3.0 - 2.0 * s)
 
 

@@ -25,6 +25,27 @@ def test_a_jump_is_measured_and_motion_is_not():
     assert np.max(jumps_m(T, smooth)) == pytest.approx(0.05, rel=0.1)
 
 
+@pytest.mark.parametrize("hz", [100, 200, 400])
+@pytest.mark.parametrize("part", ["planted", "leaving", "rising", "fastest", "top", "falling"])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_jump_of_5_mm_shows_wherever_it_happens(hz, part, axis):
+    """Within a swing of 62 mm of way per frame of its own at 100 Hz, with a break of the pace at the landing."""
+    t = np.arange(0.0, 3.0, 1.0 / hz) + 1e-4 * np.sin(np.arange(3 * hz))
+    share = np.clip((t - 1.0) / 0.3, 0.0, 1.0)
+    height, q = 0.1 * np.sin(np.pi * share) ** 2, share - np.sin(2.0 * np.pi * share) / (2.0 * np.pi)
+    p = np.stack([0.93 * q - 1.5 * np.maximum(0.0, t - 1.3), height], axis=-1)
+    own = jumps_m(t, p)
+    assert np.max(own) < 0.0015
+    at = {"planted": 0.6, "leaving": 1.04, "rising": 1.1, "fastest": 1.15, "top": 1.16, "falling": 1.22}[part]
+    for spread in {1, max(1, hz // 100)}:  # in one frame, or in all frames of one picture of an engine
+        moved = p.copy()
+        first = int(np.searchsorted(t, at))
+        moved[:, axis] += 0.005 * np.clip((np.arange(len(t)) - first + 1) / spread, 0.0, 1.0)
+        found = jumps_m(t, moved)
+        assert np.max(found) == pytest.approx(0.005, abs=0.0025)
+        assert abs(t[int(np.argmax(found))] - at) < 0.03
+
+
 def test_a_foot_that_goes_back_as_fast_as_the_avatar_goes_does_not_skate():
     z = 0.3 - 1.2 * (T % 0.5)
     planted = T % 0.5 < 0.45
