@@ -16,7 +16,9 @@ from godot_project import GodotProject
 from foottrack_client import Endpoints
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
-SECONDS = 5.0
+SAMPLES = 240
+LIFT_M = 0.08
+"""Walking in place lifts each foot by a hand's breadth."""
 
 
 @pytest.fixture
@@ -39,17 +41,13 @@ def demo(tmp_path: Path) -> Iterator[Endpoints]:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no ptys")
 def test_the_avatar_s_feet_go_where_the_person_s_do(godot: GodotProject, demo: Endpoints) -> None:
-    with godot.start("demo.gd", {**ports(demo), "seconds": SECONDS}) as run:
+    with godot.start("demo.gd", {**ports(demo), "samples": SAMPLES, "lift": LIFT_M}) as run:
         said = run.until("moved")
     assert 0.7 < said["scale"] < 1.3
     for side, samples in said["feet"].items():
         shown = np.array([each[1] for each in samples])
         told = np.array([each[2] for each in samples])
-        # Walking in place lifts each foot by a hand's breadth, several times.
-        lifted = np.ptp(told[:, 1])
-        assert lifted > 0.08, side
-        assert np.ptp(shown[:, 1]) == pytest.approx(lifted, rel=0.15)
-        # The avatar's ankle sits higher or lower above its sole, and a moving foot is shown where it will be.
+        # The avatar's ankle sits higher or lower above its sole; legs may be stretched for a moment.
         away = np.linalg.norm(shown - told - np.median(shown - told, axis=0), axis=1)
-        assert np.median(away) < 0.01
-        assert np.percentile(away, 95) < 0.08
+        assert np.median(away) < 0.002, side
+        assert np.percentile(away, 80) < 0.02, side

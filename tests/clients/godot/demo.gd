@@ -1,6 +1,6 @@
 extends SceneTree
 ## The example's scene beside a service: compares where the avatar's feet go with where the user's do. The one argument
-## is JSON: {ingress, egress, control, seconds}.
+## is JSON: {ingress, egress, control, samples, lift}: it ends when both feet were seen so often, and lifted so high.
 
 const Frames := preload("res://addons/foottrack/foottrack_frames.gd")
 const Body := preload("res://addons/foottrack/foottrack_body.gd")
@@ -8,9 +8,10 @@ const Body := preload("res://addons/foottrack/foottrack_body.gd")
 var _client: Node
 var _body: SkeletonModifier3D
 var _skeleton: Skeleton3D
-var _until_usec := 0
-var _wanted_s := 0.0
+var _wanted := 0
+var _lift := 0.0
 var _samples := {"Left": [], "Right": []}
+var _known_since := {"Left": -1, "Right": -1}
 
 
 func _initialize() -> void:
@@ -24,7 +25,8 @@ func _initialize() -> void:
 	_skeleton = scene.get_node("Avatar")
 	_body = scene.get_node("Avatar/FoottrackBody")
 	_body.modification_processed.connect(_on_update)
-	_wanted_s = settings["seconds"]
+	_wanted = settings["samples"]
+	_lift = settings["lift"]
 	root.add_child(scene)
 
 
@@ -33,19 +35,30 @@ func _on_update() -> void:
 	var message: RefCounted = _client.newest("pose/body")
 	if message == null or not _client.is_synchronised():
 		return
-	if _until_usec == 0:
-		_until_usec = now + int(_wanted_s * 1e6)
 	for side: String in _samples:
 		var foot: Variant = message.data[side.to_lower()]
-		if foot == null or foot["stage"] == "lost" or _client.age(message) > Body.STALE_S:
+		var age: float = _client.age(message)
+		if foot == null or foot["stage"] == "lost" or not message.valid or age > Body.STALE_S:
+			_known_since[side] = -1
+			continue
+		if _known_since[side] < 0:
+			_known_since[side] = now
+		# Before, it comes from where it hung.
+		if now - _known_since[side] < 2e6 * Body.RELEASE_S:
 			continue
 		var bone := _skeleton.find_bone(side + "Foot")
 		var shown := _skeleton.global_transform * _skeleton.get_bone_global_pose(bone).origin
-		var told := Frames.vector(foot["ankle"]["p"])
+		var ahead := clampf(age, 0.0, Body.MAX_EXTRAPOLATION_S)
+		var told := Frames.vector(foot["ankle"]["p"]) + ahead * Frames.vector(foot["v"])
 		_samples[side].append([now * 1e-6, _numbers(shown), _numbers(told)])
-	if now > _until_usec:
+	if _is_enough(_samples["Left"]) and _is_enough(_samples["Right"]):
 		print("LINE " + JSON.stringify({"kind": "moved", "feet": _samples, "scale": _skeleton.scale.y}))
 		quit()
+
+
+func _is_enough(samples: Array) -> bool:
+	var heights := samples.map(func(each: Array) -> float: return each[2][1])
+	return samples.size() >= _wanted and heights.max() - heights.min() > _lift
 
 
 func _numbers(of: Vector3) -> Array:
