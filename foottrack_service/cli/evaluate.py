@@ -10,12 +10,18 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.status import Status
 from rich.table import Table
 
 from foottrack_service.cli.running import EXIT_USAGE, CommandFailed, JsonOption, print_json
 
 _WIDTH = 140
 _FIGURES = ("mean", "median", "p95", "max")
+_REAL_TITLES = {
+    "tracks": "Real walks and runs against motion capture, rms on the floor, m",
+    "returns": "Real walks that end where they began: where they end, mm",
+    "strides": "Real strides: length against the heel's marker, rms",
+}
 DEFAULT_SECTIONS = ("tasks", "technical", "study")
 
 
@@ -69,7 +75,8 @@ def evaluate(
     if real is not None:
         from foottrack_service.evaluation.real import real_tables
 
-        results: dict[str, Any] = {"real": real_tables(real)}
+        with Status("reading", console=Console(stderr=True)) as shown:
+            results: dict[str, Any] = {"real": real_tables(real, shown.update)}
     elif file is not None:
         from foottrack_service.evaluation.recorded import recorded_tables
 
@@ -185,7 +192,8 @@ def _as_tables(results: dict[str, Any]) -> list[Table]:
     if "gaps" in results:
         shown.append(_gap_table(results["gaps"]))
     if "real" in results:
-        shown.append(_plain_table("Real recordings", results["real"]))
+        for name, title in _REAL_TITLES.items():
+            shown.append(_plain_table(title, results["real"][name]))
     return shown
 
 

@@ -1,7 +1,8 @@
 """Public recordings of foot-worn IMUs with a reference, read into the wire's frames. Their data is not part of this.
 
 ``gaitmap``: both feet, 204.8 Hz, motion capture of heels and toes. ``llio_pyshoe_vicon_dev``: one foot, 200 Hz, Vicon.
-``llio_corridor_dev``: one foot, 200 Hz, counted strides. ``quest_wip``: a headset's poses, 72 Hz.
+``llio_corridor_dev``: one foot, 200 Hz, counted strides. ``xio_gait``: one foot, 400 Hz, ends where it began.
+``quest_wip``: a headset's poses, 72 Hz.
 """
 
 from __future__ import annotations
@@ -15,11 +16,13 @@ from pathlib import Path
 import numpy as np
 
 from foottrack_protocol import Message
+from foottrack_protocol.frames import SIDES
 from foottrack_protocol.messages import Imu, Side
 from foottrack_service import rotations as rot
 from foottrack_service.config import Settings
 from foottrack_service.rotations import Array
 
+STANDARD_GRAVITY = 9.80665
 GAITMAP_HZ = 204.8
 GAITMAP_MOCAP_HZ = 100.0
 _FORWARD_LEFT_UP_TO_FOOT = rot.from_matrix(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]))
@@ -98,6 +101,16 @@ def pyshoe(file: Path) -> FootTrial:
     )
 
 
+def pyshoe_peer(file: Path) -> Array:
+    """Where another filter (pyshoe: a learned detector of stances) saw that foot, m, (n, 2). Raises DatasetError."""
+    try:
+        with np.load(file) as data:
+            places: Array = np.asarray(data["pyshoe_xy"], dtype=np.float64) * [1.0, -1.0]
+    except (OSError, KeyError, ValueError) as error:
+        raise DatasetError(f"{file}: {error}") from None
+    return places
+
+
 def corridor(file: Path) -> tuple[FootTrial, int]:
     """One long walk with an IMU on one foot, and how many strides that foot took. Raises DatasetError."""
     try:
@@ -112,6 +125,28 @@ def corridor(file: Path) -> tuple[FootTrial, int]:
         name, "right", t, columns["acc"], columns["gyr"], _FORWARD_RIGHT_DOWN_TO_FOOT, t[marks], columns["gcp_xy"]
     )
     return trial, len(marks) - 1
+
+
+def xio(file: Path) -> FootTrial:
+    """One walk that ends where it began; its stamps repeat and leave gaps. Raises DatasetError."""
+    try:
+        values = np.genfromtxt(file, delimiter=",", skip_header=1, usecols=range(7))
+    except (OSError, ValueError) as error:
+        raise DatasetError(f"{file}: {error}") from None
+    t, acc, gyro = values[:, 0], STANDARD_GRAVITY * values[:, 4:7], np.radians(values[:, 1:4])
+    ends = values[[0, -1], 0]
+    return FootTrial(f"xio {file.stem}", "right", t, acc, gyro, _FORWARD_LEFT_UP_TO_FOOT, ends, np.zeros((2, 2)))
+
+
+def gaitmap_strides(folder: Path) -> dict[Side, Array]:
+    """From when to when each of the annotated strides goes, s, shape (n, 2). Raises DatasetError."""
+    file = folder / "stride_events_sample.csv"
+    try:
+        with file.open(newline="", encoding="utf-8") as stream:
+            rows = [(row["foot"], float(row["start"]), float(row["end"])) for row in csv.DictReader(stream)]
+    except (OSError, KeyError, ValueError) as error:
+        raise DatasetError(f"{file}: {error}") from None
+    return {side: np.array([ends for foot, *ends in rows if foot == side]) / GAITMAP_HZ for side in SIDES}
 
 
 @dataclass(frozen=True, slots=True)
