@@ -46,7 +46,11 @@ def evaluate(
         ),
     ] = "simulated",
     real: Annotated[
-        Path | None, typer.Option("--real", help="Instead: real recordings of foot-worn IMUs in this folder.")
+        Path | None,
+        typer.Option(
+            "--real",
+            help="Instead: real recordings of foot-worn IMUs in this folder, beside peers (gaitmap: extra `peers`).",
+        ),
     ] = None,
     gait: Annotated[
         bool, typer.Option("--gait", help="Instead: walking in place; with --real also recordings of real steps.")
