@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -115,13 +116,19 @@ def calibrate_floor(
 def _grid_points(frame: Frame, intrinsics: Intrinsics) -> Array:
     if frame.depth is None:
         return np.zeros((0, 3))
-    rows = np.linspace(0, frame.depth.shape[0] - 1, _SAMPLES[0] + 2)[1:-1].astype(int)
-    columns = np.linspace(0, frame.depth.shape[1] - 1, _SAMPLES[1] + 2)[1:-1].astype(int)
-    z = frame.depth[np.ix_(rows, columns)].astype(np.float64) * frame.depth_unit
-    v, u = np.meshgrid(rows, columns, indexing="ij")
+    rows, columns, rays = _grid(frame.depth.shape, intrinsics)
+    z = frame.depth[rows, columns].astype(np.float64) * frame.depth_unit
     known = (z > 0.0) & (z < 4.0)
-    rays = intrinsics.rays(np.stack([u[known], v[known]], axis=1))
-    return np.asarray(np.column_stack([rays, np.ones(len(rays))]) * z[known][:, None])
+    return rays[known] * z[known, None]
+
+
+@lru_cache(maxsize=4)
+def _grid(shape: tuple[int, int], intrinsics: Intrinsics) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array]:
+    """Rows (n,) and columns (n,) of samples all over a picture, and their rays (n, 3) of unit depth."""
+    rows = np.linspace(0, shape[0] - 1, _SAMPLES[0] + 2)[1:-1].astype(np.intp)
+    columns = np.linspace(0, shape[1] - 1, _SAMPLES[1] + 2)[1:-1].astype(np.intp)
+    v, u = (each.ravel() for each in np.meshgrid(rows, columns, indexing="ij"))
+    return v, u, np.column_stack([intrinsics.rays(np.stack([u, v], axis=1)), np.ones(len(u))])
 
 
 def _refit(points: Array, normal: Array, height: float, within: float) -> Plane | None:
@@ -130,7 +137,8 @@ def _refit(points: Array, normal: Array, height: float, within: float) -> Plane 
         if len(agree) < _MIN_SHARE * len(points):
             return None
         centre = agree.mean(axis=0)
-        normal = np.linalg.svd(agree - centre, full_matrices=False)[2][2]
+        off = agree - centre
+        normal = np.linalg.eigh(off.T @ off)[1][:, 0]
         height = -float(normal @ centre)
         if height < 0.0:
             normal, height = -normal, -height

@@ -13,7 +13,7 @@ from foottrack_service.camera.detector import Detection, TagDetector, Window
 from foottrack_service.camera.fix import Fix, edge_distance
 from foottrack_service.camera.frame import Frame
 from foottrack_service.camera.pose import CORNER_SIGMA_PX, solve_target
-from foottrack_service.camera.ranging import join_depth
+from foottrack_service.camera.ranging import DEPTH_NOISE, join_depth
 from foottrack_service.camera.rig import Rig
 from foottrack_service.camera.targets import Target, owners
 from foottrack_service.rotations import Array
@@ -22,8 +22,6 @@ LOST_AFTER_S = 0.1
 """How long a tag is expected where it was heading before the whole picture is searched."""
 SEARCH_PERIOD_S = 0.05
 """A whole picture costs ten windows: while a tag is lost, one is searched so often."""
-DEPTH_NOISE = 0.0038
-"""Standard deviation of a depth pixel at 1 m, m: 0.08 px of disparity of a D435 at 848 px."""
 
 _SPEED_M_S = 5.0
 _ACCELERATION_M_S2 = 150.0

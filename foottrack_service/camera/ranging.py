@@ -15,6 +15,8 @@ from foottrack_service.camera.pose import TargetPose
 from foottrack_service.camera.targets import Target
 from foottrack_service.rotations import Array, rotate
 
+DEPTH_NOISE = 0.0038
+"""Standard deviation of a depth pixel at 1 m, m: 0.08 px of disparity of a D435 at 848 px."""
 PLAUSIBLE_RATIO = (0.8, 1.25)
 """Outside of this, depth and size do not speak of the same thing, and depth is left out of the position."""
 

@@ -84,6 +84,9 @@ class RenderedSettings(Section):
     seed: int = 0
     seconds: Positive | None = Field(default=None, description="how long; the task's own length unless given")
     feet: Literal["mild", "hard"] = "mild"
+    covered: tuple[tuple[NotNegative, NotNegative], ...] = Field(
+        default=(), description="when trouser legs hang over the tags, [begin, end) s of the task"
+    )
     fps: Positive = 60.0
     readout: NotNegative = 0.010
     latency: NotNegative = Field(default=0.030, description="exposure to the picture's arrival, s")

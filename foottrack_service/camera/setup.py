@@ -108,7 +108,7 @@ def _open_rendered(settings: Settings, now: Callable[[], int] | None) -> Source:
     except ValueError as error:
         raise SourceError(f"[camera.source.rendered]: {error}") from error
     truth = scenario.truth
-    scene = Scene(truth.head.pose, {side: truth.feet[side].pose for side in SIDES}, shoes)
+    scene = Scene(truth.head.pose, {side: truth.feet[side].pose for side in SIDES}, shoes, covered=rendered.covered)
     renderer = Renderer(
         scene,
         rig_of(camera, source.lens.intrinsics()),

@@ -35,8 +35,8 @@ def evaluate(
         str | None,
         typer.Option(
             "--sections",
-            help=f"Of tasks, technical, study, variants, gaps; or all. {','.join(DEFAULT_SECTIONS)} if absent, and "
-            "tasks alone with --camera rendered.",
+            help=f"Of tasks, technical, study, variants, gaps, covered; or all. {','.join(DEFAULT_SECTIONS)} if absent,"
+            " and tasks alone with --camera rendered.",
         ),
     ] = None,
     camera: Annotated[
@@ -189,6 +189,8 @@ def _as_tables(results: dict[str, Any]) -> list[Table]:
         shown += [_fix_table(results["tasks"]), _centre_table(results["tasks"])]
     for label, rows in results.get("variants", {}).items():
         shown.append(_task_table(f"The same, {label}", rows))
+    if "covered" in results:
+        shown.append(_task_table("The same, tags covered after 3 s: depth alone shows the shoes", results["covered"]))
     if "technical" in results:
         shown.append(_technical_table(results["technical"]))
     if "study" in results:

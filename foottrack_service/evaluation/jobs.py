@@ -125,7 +125,11 @@ def run_job(job: Job) -> JobResult:
     if job.camera == "rendered":
         from foottrack_service.evaluation.rendered import with_pictures
 
-        arrivals = list(_outside(with_pictures(scenario, job.feet), gap_windows(job)))
+        arrivals = list(
+            _outside(
+                with_pictures(scenario, job.feet, covered_from=CUT_S if job.only == "depth" else None), gap_windows(job)
+            )
+        )
     began = time.perf_counter()
     notes = FixNotes()
     runs, core = run_filter(_left_on(arrivals, job.only), settings, notes.make)

@@ -24,11 +24,13 @@ SEARCH_S = 0.003
 _HOP_NS = 150_000
 
 
-def with_pictures(scenario: Scenario, feet: Feet = "mild", fps: float = 60.0) -> Iterator[tuple[int, Message]]:
+def with_pictures(
+    scenario: Scenario, feet: Feet = "mild", fps: float = 60.0, covered_from: float | None = None
+) -> Iterator[tuple[int, Message]]:
     """A scenario's messages in order of arrival, ns, with the finds of its pictures for the camera's.
 
-    ``feet`` are those that the scenario was simulated with. Deterministic. Raises SourceError for settings that no
-    camera can have.
+    ``feet`` are those that the scenario was simulated with; from ``covered_from`` s on trouser legs hang over the tags.
+    Deterministic. Raises SourceError for settings that no camera can have.
     """
     rest = (
         (arrival, message)
@@ -36,7 +38,7 @@ def with_pictures(scenario: Scenario, feet: Feet = "mild", fps: float = 60.0) ->
         if not message.stream.startswith(("marker/", "depth/"))
     )
     seen_by = scenario.settings.model_copy(update={"fusion": FusionSettings()}).model_dump_json()
-    finds = found_in_pictures(scenario.task, scenario.seed, scenario.seconds, feet, seen_by, fps)
+    finds = found_in_pictures(scenario.task, scenario.seed, scenario.seconds, feet, seen_by, fps, covered_from)
     shifted = (
         (arrival + scenario.start, message._replace(t=message.t + scenario.start, t_pub=message.t_pub + scenario.start))
         for arrival, message in finds
@@ -46,12 +48,14 @@ def with_pictures(scenario: Scenario, feet: Feet = "mild", fps: float = 60.0) ->
 
 @lru_cache(maxsize=1)
 def found_in_pictures(
-    task: str, seed: int, seconds: float, feet: Feet, settings_json: str, fps: float
+    task: str, seed: int, seconds: float, feet: Feet, settings_json: str, fps: float, covered_from: float | None = None
 ) -> tuple[tuple[int, Message], ...]:
     """``marker/*`` and ``depth/*`` of a scenario that begins at 0, with arrivals, ns; kept for the next filter."""
     settings = Settings.model_validate_json(settings_json)
     cv2.setNumThreads(1)
-    scene = {"task": task, "seed": seed, "seconds": seconds, "feet": feet, "fps": fps, "start": 0}
+    scene: dict[str, object] = {"task": task, "seed": seed, "seconds": seconds, "feet": feet, "fps": fps, "start": 0}
+    if covered_from is not None:
+        scene["covered"] = [(covered_from, seconds + 1.0)]
     source = settings.camera.source
     rendered = type(source.rendered).model_validate({**source.rendered.model_dump(), **scene})
     source = source.model_copy(update={"kind": "rendered", "rendered": rendered})

@@ -2,7 +2,7 @@
 
 ``tasks``: every task, both feet with IMU, and a smoother as the lower bound. ``technical``: [B]'s bench by the source
 that is left on. ``study``: [B]'s six tasks with the left foot without IMU. ``variants``: 400 Hz, hard feet, raw axes.
-``gaps``: the camera goes dark in a walk.
+``gaps``: the camera goes dark in a walk. ``covered``: the tags are covered after 3 s, and depth alone shows the shoes.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from foottrack_service.evaluation.published import (
 from foottrack_service.evaluation.statistics import summary_mm
 from foottrack_service.simulation.tasks import TASKS
 
-Section = Literal["tasks", "technical", "study", "variants", "gaps"]
-SECTIONS: tuple[Section, ...] = ("tasks", "technical", "study", "variants", "gaps")
+Section = Literal["tasks", "technical", "study", "variants", "gaps", "covered"]
+SECTIONS: tuple[Section, ...] = ("tasks", "technical", "study", "variants", "gaps", "covered")
 VARIANTS: dict[str, dict[str, Any]] = {
     "400 Hz": {"imu_hz": 400.0},
     "hard feet": {"feet": "hard"},
@@ -58,6 +58,8 @@ def jobs_of(section: Section, tasks: Sequence[str], seeds: Sequence[int], camera
             for job in wanted
             for source in TECHNICAL_LATENCY_S
         ]
+    if section == "covered":
+        return [replace(job, only="depth") for job in filtered]
     if section == "study":
         return [replace(job, left_imu=False) for job in filtered if job.task in STUDY_MEDIAN_MM]
     if section == "variants":
@@ -86,7 +88,7 @@ def tables(
     """A section's figures, as ``--json`` prints them."""
     wanted = jobs_of(section, tasks, seeds, camera)
     found = [results[job] for job in wanted]
-    if section == "tasks":
+    if section in ("tasks", "covered"):
         return {task: _row(task, [r for r in found if r.job.task == task]) for task in tasks}
     if section == "variants":
         return {
@@ -119,6 +121,7 @@ def figures(results: Sequence[JobResult], sides: Sequence[Side] = SIDES) -> dict
         "frame_to_frame": _rounded(1e3 * float(np.mean([jitter[1] for jitter in jitters]))) if jitters else None,
         "skate": _rounded(1e3 * float(np.mean(skates))) if skates else None,
         "within_sigma": within_sigma(_joined(foot.in_sigma for foot in feet), np.ones(1)),
+        "accepted": _added(result.accepted for result in results),
         "rejected": _added(result.rejected for result in results),
         **_fix_shares(_added(result.fixes for result in results)),
         "by_centre_px": _by_centre(np.concatenate([np.empty((0, 2)), *(foot.tags for foot in feet)])),

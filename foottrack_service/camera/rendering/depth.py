@@ -15,7 +15,6 @@ from foottrack_service.rotations import Array
 
 Field = npt.NDArray[np.float32]
 Faces = Sequence[tuple[int, ...]]
-SHEET_FACES: Faces = ((3, 2, 1, 0),)
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,17 @@ straight; the floor, on which nothing is measured, has blur but neither distorti
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from foottrack_service.camera.rendering.depth import SHEET_FACES, DepthModel, Surface, draw_depth
+from foottrack_service.camera.rendering.depth import DepthModel, Surface, draw_depth
 from foottrack_service.camera.rendering.motion import Poses
 from foottrack_service.camera.rendering.noise import NoiseBank
-from foottrack_service.camera.rendering.scene import FLOOR_TILE_M, Scene, Sheet, Shoe, Solid, floor_texture, shin_of
+from foottrack_service.camera.rendering.scene import FLOOR_TILE_M, Part, Scene, Sheet, Solid, floor_texture, shin_of
 from foottrack_service.camera.rig import Rig
 from foottrack_service.rotations import Array
 
@@ -76,8 +77,10 @@ class Renderer:
         picture = self._draw_floor(head, t)
         shoes = self.scene.shoes
         far_first = sorted(feet, key=lambda side: -self._distance(head, feet[side], t))
+        covered = self.scene.is_covered(t)
+        parts = {side: shoes[side].parts(covered) for side in far_first}
         for side in far_first:
-            self._draw_shoe(picture, shoes[side], feet[side], shins[side], head, t)
+            self._draw_shoe(picture, parts[side], shoes[side].shin, feet[side], shins[side], head, t)
         if self._picture.psf > 0.0:
             picture = np.asarray(cv2.GaussianBlur(picture, (0, 0), self._picture.psf), dtype=np.uint8)
         picture = self._noise.apply(picture, self._picture.read_noise, self._picture.shot_noise)
@@ -86,9 +89,8 @@ class Renderer:
         surfaces: list[Surface] = []
         for side in far_first:
             foot, shin = feet[side].one(t), shins[side].one(t)
-            surfaces += [(solid.vertices, solid.faces, *foot) for solid in (shoes[side].last, shoes[side].upper)]
-            surfaces += [(sheet.corners, SHEET_FACES, *foot) for sheet in shoes[side].sheets]
-            surfaces.append((shoes[side].shin.vertices, shoes[side].shin.faces, *shin))
+            surfaces += [(part.points, part.faces, *foot) for part in parts[side]]
+            surfaces.append((shoes[side].shin.points, shoes[side].shin.faces, *shin))
         depth = draw_depth(surfaces, self._camera(*head.one(t)), self.scene.floor_height, self.rig.intrinsics)
         return picture, self._depth.spoil(depth, self.rig.intrinsics, self._noise)
 
@@ -161,14 +163,21 @@ class Renderer:
         return np.asarray(picture)
 
     def _draw_shoe(
-        self, picture: npt.NDArray[np.uint8], shoe: Shoe, foot: Poses, shin: Poses, head: Poses, t: float
+        self,
+        picture: npt.NDArray[np.uint8],
+        parts: Sequence[Part],
+        leg: Solid,
+        foot: Poses,
+        shin: Poses,
+        head: Poses,
+        t: float,
     ) -> None:
-        points = np.concatenate([shoe.last.vertices, *(s.corners for s in shoe.sheets), shoe.upper.vertices])
+        points = np.concatenate([part.points for part in parts])
         half = 0.5 * self.shutter.exposure
 
         def project(offsets: Array) -> Array | None:
             on_foot, foot_visible = self._project(points, foot, head, t, offsets)
-            on_shin, shin_visible = self._project(shoe.shin.vertices, shin, head, t, offsets)
+            on_shin, shin_visible = self._project(leg.points, shin, head, t, offsets)
             return np.concatenate([on_foot, on_shin], axis=1) if foot_visible and shin_visible else None
 
         ends = project(np.array([-half, half]))
@@ -193,23 +202,22 @@ class Renderer:
         total = np.zeros(under.shape, dtype=np.float32)
         for instant in pixels:
             canvas = np.array(under, dtype=np.uint8)
-            _draw_instant(canvas, shoe, instant)
+            _draw_instant(canvas, (*parts, leg), instant)
             cv2.accumulate(canvas, total)
         mean = cv2.resize(total / count, (roi.shape[1], roi.shape[0]), interpolation=cv2.INTER_AREA)
         roi[:] = np.rint(mean).astype(np.uint8)
 
 
-def _draw_instant(canvas: npt.NDArray[np.uint8], shoe: Shoe, pixels: Array) -> None:
-    """`pixels` (n, 2): the vertices of all parts, in the order in which they are drawn."""
+def _draw_instant(canvas: npt.NDArray[np.uint8], parts: Sequence[Part], pixels: Array) -> None:
+    """`pixels` (n, 2): the points of all parts, in the order in which they are drawn."""
     first = 0
-    parts: tuple[Solid | Sheet, ...] = (shoe.last, *shoe.sheets, shoe.upper, shoe.shin)
     for part in parts:
+        here = pixels[first : first + len(part.points)]
         if isinstance(part, Sheet):
-            _draw_sheet(canvas, part, pixels[first : first + 4])
-            first += 4
+            _draw_sheet(canvas, part, here)
         else:
-            _draw_solid(canvas, part, pixels[first : first + len(part.vertices)])
-            first += len(part.vertices)
+            _draw_solid(canvas, part, here)
+        first += len(part.points)
 
 
 def _draw_solid(canvas: npt.NDArray[np.uint8], solid: Solid, corners: Array) -> None:

@@ -28,32 +28,42 @@ PAPER, INK = 205, 32
 
 @dataclass(frozen=True)
 class Solid:
-    """A convex body: `vertices` (n, 3) m in the foot's frame, `faces` outward counter-clockwise, with grey levels."""
+    """A convex body: `points` (n, 3) m in the foot's frame, `faces` outward counter-clockwise, with grey levels."""
 
-    vertices: Array
+    points: Array
     faces: tuple[tuple[int, ...], ...]
     grey: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A printed tag with its white margin: `corners` (4, 3) in the foot's frame, and mipmaps of the print."""
+    """A printed tag with its white margin: `points` (4, 3) in the foot's frame, and mipmaps of the print."""
 
-    corners: Array
+    points: Array
     textures: tuple[npt.NDArray[np.uint8], ...]
+    faces: tuple[tuple[int, ...], ...] = ((3, 2, 1, 0),)
+
+
+Part = Solid | Sheet
 
 
 @dataclass(frozen=True)
 class Shoe:
     """One foot as the camera sees it, drawn in this order: sole and toes, tags, ankle, and the shin that hides them.
 
-    All in the foot's frame but the shin, which has its origin at the ankle too and +Y towards the knee.
+    All in the foot's frame but the shin, which has its origin at the ankle too and +Y towards the knee. The hem of
+    a trouser leg may lie over the tags.
     """
 
     last: Solid
     sheets: tuple[Sheet, ...]
     upper: Solid
     shin: Solid
+    hem: Solid
+
+    def parts(self, covered: bool) -> tuple[Part, ...]:
+        """What moves with the foot, in the order of drawing."""
+        return (self.last, *self.sheets, self.upper, *([self.hem] if covered else []))
 
 
 @dataclass(frozen=True)
@@ -64,6 +74,12 @@ class Scene:
     feet: Mapping[str, PoseTrack]
     shoes: Mapping[str, Shoe]
     floor_height: float = 0.0
+    covered: Sequence[tuple[float, float]] = ()
+    """When the tags are covered, s: [begin, end)."""
+
+    def is_covered(self, t: float) -> bool:
+        """Whether hems hang over the tags at `t`, s."""
+        return any(begin <= t < end for begin, end in self.covered)
 
 
 def make_shoe(
@@ -87,7 +103,8 @@ def make_shoe(
     last = _prism([(0.07, low), (0.07, step), (-0.10, step), (-0.20, low + 0.025), (-0.20, low)], 0.045, 95)
     upper = _prism([(0.07, step), (0.06, 0.03), (-0.03, 0.03), (-0.085, step)], 0.04, 70)
     shin = _prism([(0.045, 0.02), (0.06, 0.28), (-0.05, 0.28), (-0.035, 0.02)], 0.045, 55)
-    return Shoe(last, tuple(sheets), upper, shin)
+    hem = _prism([(-0.085, step), (-0.085, step + 0.016), (-0.21, step + 0.016), (-0.21, step)], 0.05, 60)
+    return Shoe(last, tuple(sheets), upper, shin, hem)
 
 
 def shin_of(head: PoseTrack, foot: PoseTrack) -> PoseTrack:
