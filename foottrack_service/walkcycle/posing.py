@@ -22,7 +22,8 @@ X_AXIS, Y_AXIS, Z_AXIS = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]
 class UpperBody:
     """Amplitudes in degrees, about a carriage. Pelvis and chest turn against each other once a cycle, the arms swing
     against the legs, the head looks ahead. `elbow_drag` opens and bends the elbow twice a cycle, a quarter of its wave
-    off the swing: it draws the wrist's arc out into a figure of eight."""
+    off the swing, and `elbow_lead` (cycles) lets its own wave come before the shoulder's: either draws the wrist's arc
+    out into a figure of eight."""
 
     pelvis_yaw: float = 4.4
     pelvis_list: float = 3.4
@@ -34,11 +35,13 @@ class UpperBody:
     elbow: float = 18.0
     elbow_swing: float = 12.0
     elbow_drag: float = 10.0
+    elbow_lead: float = 0.0
 
     def rotations(self, phase: float) -> dict[str, Quaternion]:
         """Joint rotations at a phase; 0 is the left foot's contact, when the left arm is behind."""
         wave = float(np.cos(2.0 * np.pi * phase))
         late = float(np.cos(2.0 * np.pi * (phase - 0.15)))
+        bent = float(np.cos(2.0 * np.pi * (phase + self.elbow_lead)))
         drag = float(np.sin(4.0 * np.pi * phase))
         yaw, sway = -self.pelvis_yaw * wave, self.pelvis_list * late
         joints = {"hips": _turn(yaw, sway, 0.0)}
@@ -49,7 +52,7 @@ class UpperBody:
             joints[name] = _turn(-0.5 * self.chest_yaw * wave, 0.0, -0.5 * self.lean)
         for side, sign in (("left", -1.0), ("right", 1.0)):
             swing = self.arm_forward + self.lean + self.arm * sign * wave
-            bend = self.elbow + self.elbow_swing * sign * wave - self.elbow_drag * drag
+            bend = self.elbow + self.elbow_swing * sign * bent - self.elbow_drag * drag
             joints[f"{side}Shoulder"] = _turn(0.15 * self.arm * wave, 0.0, 0.0)
             joints.update(
                 arm_rotations(side, np.radians(swing), np.radians(max(bend, 2.0)), np.radians(self.abduction))

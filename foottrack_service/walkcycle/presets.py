@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from foottrack_service import rotations as rot
 from foottrack_service.walkcycle.curves import smooth_step
@@ -18,9 +19,11 @@ from foottrack_service.walkcycle.cycle import STRIKE
 from foottrack_service.walkcycle.errors import ProjectError
 from foottrack_service.walkcycle.normative import PELVIC_TILT_DEG, normative_mean
 from foottrack_service.walkcycle.posing import UpperBody, standing_foot, swinging_foot
-from foottrack_service.walkcycle.project import ContactTiming, FootPose, Key, Pose, Project
+from foottrack_service.walkcycle.project import ContactTiming, FootPose, Key, Pose, Project, Quaternion
 from foottrack_service.walkcycle.rollover import planted_ankle
 from foottrack_service.walkcycle.skeleton import INDEX, SIDES, Humanoid
+
+Array = npt.NDArray[np.float64]
 
 NAMES: Final = {0.0: "contact", 0.125: "down", 0.25: "pass", 0.375: "up"}
 _HALF_WIDTH_M: Final = 0.055
@@ -37,20 +40,21 @@ def preset(name: str) -> Project:
 
 def normative() -> Project:
     """Joint angles of Schwartz 2008 at sixteen phases of the cycle, stance 60 %, 1.10 s; with legs of 0.86 m the
-    angles themselves make a stride of 1.40 m."""
+    angles themselves make a stride of 1.40 m.
+
+    The arms swing as Murray 1967 has them: the shoulder from about 24 deg back at its own side's strike to 8 ahead at
+    the other's, the elbow from about 17 to 47. That the elbow is a little ahead of the shoulder is ours: without it the
+    wrist's two ways lie on each other.
+    """
     body, timing = Humanoid(), ContactTiming()
-    upper = UpperBody()
+    upper = UpperBody(arm=16, arm_forward=-10, elbow=32, elbow_swing=15, elbow_drag=0, elbow_lead=0.04)
     keys = []
-    for eighth in range(8):
+    heights = _once_a_step([_standing_height(body, upper, eighth / 16.0, timing) for eighth in range(8)])
+    for eighth, height in enumerate(heights):
         phase = eighth / 16.0
         joints = upper.rotations(phase)
         legs = {side: _normative_leg(body, phase + STRIKE[side], timing) for side in SIDES}
-        # With the pelvis turned and listed, the hips are not where its middle is.
-        turned = rot.normalised(joints["hips"])
-        hips = {side: rot.rotate(turned, body.offsets[INDEX[f"{side}UpperLeg"]]) for side in SIDES}
-        # The pelvis is as high as the leg is long that landed last; a foot still behind has
-        # rolled halfway between what its angles and what that height say.
-        height = legs["left"].height - float(hips["left"][1])
+        hips = _hip_joints(body, joints)
         feet = {}
         sway = 0.018 * float(np.cos(2.0 * np.pi * (phase - 0.3)))
         for side, sign in (("left", 1.0), ("right", -1.0)):
@@ -58,6 +62,7 @@ def normative() -> Project:
             ankle = height + float(hip[1]) + leg.down
             pitch, toe = leg.pitch, leg.toe
             if side == "right" and leg.rolls:
+                # A foot still behind has rolled halfway between what its angles and what that height say.
                 pitch = 0.5 * (pitch - _pitch_of_heel_rise(body, ankle))
                 toe = -pitch
             place = (sign * (_HALF_WIDTH_M - leg.whip), ankle, float(hip[2]) + leg.ahead)
@@ -76,8 +81,8 @@ def animator() -> Project:
         0.25: (0.225, 0.02, -28.0, 10.0),
         0.375: (0.185, 0.32, 8.0, 8.0),
     }
-    height = {0.0: 0.892, 0.125: 0.868, 0.25: 0.925, 0.375: 0.945}
-    return _textbook("animator", 1.0, timing, upper, 0.72, height, swing, pitches=(24.0, -12.0, -36.0))
+    height = {0.0: 0.882, 0.125: 0.862, 0.25: 0.918, 0.375: 0.932}
+    return _textbook("animator", 1.0, timing, upper, 0.70, height, swing, pitches=(24.0, -12.0, -36.0))
 
 
 def sneak() -> Project:
@@ -104,7 +109,7 @@ def double_bounce() -> Project:
         0.25: (0.26, 0.03, -25.0, 10.0),
         0.375: (0.20, 0.30, 4.0, 8.0),
     }
-    height = {0.0: 0.925, 0.125: 0.86, 0.25: 0.925, 0.375: 0.87}
+    height = {0.0: 0.915, 0.125: 0.86, 0.25: 0.92, 0.375: 0.87}
     return _textbook("double-bounce", 1.0, timing, upper, 0.56, height, swing, pitches=(18.0, -8.0, -32.0))
 
 
@@ -128,6 +133,26 @@ class _Leg:
     height: float
     whip: float
     rolls: bool
+
+
+def _hip_joints(body: Humanoid, joints: dict[str, Quaternion]) -> dict[str, Array]:
+    """Where the hip joints are about the pelvis' middle, (3,) m, with the pelvis turned and listed."""
+    turned = rot.normalised(joints["hips"])
+    return {side: rot.rotate(turned, body.offsets[INDEX[f"{side}UpperLeg"]]) for side in SIDES}
+
+
+def _standing_height(body: Humanoid, upper: UpperBody, phase: float, timing: ContactTiming) -> float:
+    """The pelvis is as high as the leg is long that landed last, m."""
+    leg = _normative_leg(body, phase, timing)
+    return leg.height - float(_hip_joints(body, upper.rotations(phase))["left"][1])
+
+
+def _once_a_step(heights: list[float]) -> list[float]:
+    """The wave in these that rises and falls once a step, as a pelvis does: it has not the joint angles' own jolts,
+    which a body's mass would not follow and a file's frames could not show."""
+    waves = np.fft.rfft(heights)
+    waves[2:] = 0.0
+    return [float(height) for height in np.fft.irfft(waves, len(heights))]
 
 
 def _normative_leg(body: Humanoid, phase: float, timing: ContactTiming) -> _Leg:

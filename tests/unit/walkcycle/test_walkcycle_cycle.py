@@ -20,7 +20,7 @@ from foottrack_service.walkcycle.reference import (
     step_offsets_as_printed,
 )
 from foottrack_service.walkcycle.report import angle_rms, cycle_closure
-from foottrack_service.walkcycle.skeleton import Humanoid
+from foottrack_service.walkcycle.skeleton import INDEX, Humanoid, forward_kinematics
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -60,10 +60,24 @@ def test_heels_draw_figures_of_eight_from_above(name: str) -> None:
         assert self_crossings(arc(build_cycle(preset(name)), f"{side}Heel").points[:, [2, 0]]) == 1
 
 
-@pytest.mark.parametrize("name", ["animator", "sneak", "double-bounce"])
+@pytest.mark.parametrize("name", PRESETS)
 def test_wrists_draw_figures_of_eight_from_the_side(name: str) -> None:
     for side in ("left", "right"):
         assert self_crossings(arc(build_cycle(preset(name)), f"{side}Hand").points[:, [2, 1]]) == 1
+
+
+def test_the_normative_arms_swing_as_published() -> None:
+    """Murray 1967: the shoulder 24 deg back at its own side's strike, 8 ahead at the other's; the elbow 17 to 47."""
+    cycle = build_cycle(preset("normative"))
+    motion = in_place(cycle, np.arange(0.0, 1.0, 0.02))
+    places, _ = forward_kinematics(cycle.body.offsets, motion.hips, motion.rotations)
+    shoulder, elbow, wrist = (places[:, INDEX[f"left{part}"]][:, 1:] for part in ("UpperArm", "LowerArm", "Hand"))
+    upper, lower = elbow - shoulder, wrist - elbow
+    swing = np.degrees(np.arctan2(upper[:, 1], -upper[:, 0]))
+    bend = np.degrees(np.arctan2(lower[:, 1], -lower[:, 0])) - swing
+    assert swing[0] == pytest.approx(-24.0, abs=4.0)
+    assert swing[25] == pytest.approx(8.0, abs=4.0)
+    assert (bend.min(), bend.max()) == (pytest.approx(17.0, abs=4.0), pytest.approx(47.0, abs=4.0))
 
 
 def test_crossings_of_known_curves() -> None:
