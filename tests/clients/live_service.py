@@ -10,6 +10,7 @@ from typing import Self
 from foottrack_client import Endpoints
 from foottrack_service.app import Service
 from foottrack_service.config import BusSettings, Settings
+from foottrack_service.curve_settings import CurveSettings
 
 START_TIMEOUT_S = 20.0
 
@@ -17,8 +18,10 @@ START_TIMEOUT_S = 20.0
 class LiveService:
     """Bus, control socket and system topics; no nodes, so that each message comes from the test."""
 
-    def __init__(self) -> None:
+    def __init__(self, curve: CurveSettings | None = None) -> None:
+        """``curve``: with encrypted endpoints, which are ``encrypted`` then."""
         self.endpoints = Endpoints(*["tcp://127.0.0.1:0"] * 3)
+        self._curve = curve or CurveSettings()
 
     def start(self) -> None:
         """Run on the ports of last time."""
@@ -51,9 +54,12 @@ class LiveService:
     async def _run(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._ending = asyncio.Event()
-        settings = Settings(bus=BusSettings(**self.endpoints._asdict()))
+        settings = Settings(bus=BusSettings(**self.endpoints._asdict(), curve=self._curve))
         async with Service(settings) as service:
             bus = service.endpoints
             self.endpoints = Endpoints(bus.ingress, bus.egress, bus.control)
+            ends = service.encrypted_endpoints
+            if ends:
+                self.encrypted = Endpoints(ends["publish"], ends["subscribe"], ends["control"])
             self._started.set()
             await self._ending.wait()

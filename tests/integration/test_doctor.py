@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import socket
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
 from foottrack_protocol.frames import STANDARD_GRAVITY
 from foottrack_protocol.messages import HeadPose, Imu
@@ -16,6 +19,7 @@ from foottrack_service.app import Service
 from foottrack_service.bus import Bus
 from foottrack_service.cli import doctor_devices
 from foottrack_service.cli.doctor_clocks import clock, judged, stamps
+from foottrack_service.cli.main import app
 from foottrack_service.config import BusSettings, Settings
 from foottrack_service.imu.devices.plugged import PluggedImu
 
@@ -111,3 +115,16 @@ def test_what_talks_on_a_configured_port_is_heard(configured: str, level: str, m
     heard = next(finding for finding in findings if finding.subject == imu.port)
     assert heard.level == level
     assert heard.text.startswith("rvc at 115200")
+
+
+def test_two_outputs_into_one_application_are_warned_of(tmp_path: Path) -> None:
+    settings = tmp_path / "foottrack.toml"
+    settings.write_text("[bridges.vrchat]\nenabled = true\n[bridges.vmt]\nenabled = true\n", encoding="utf-8")
+    done = CliRunner().invoke(app, ["doctor", "--config", str(settings), "--connect", "7991", "--json"])
+    found = [each for each in json.loads(done.stdout)["findings"] if each["subject"].startswith("bridge")]
+    assert [(each["subject"], each["level"]) for each in found] == [
+        ("bridge vrchat", "ok"),
+        ("bridge vmt", "ok"),
+        ("bridges", "warning"),
+    ]
+    assert "every foot twice" in found[-1]["text"]

@@ -16,7 +16,8 @@ from foottrack_client.aio import AsyncClient, AsyncSubscription
 from foottrack_client.blocking import Client, Subscription
 from foottrack_client.clock import Clock
 from foottrack_client.endpoints import Endpoints
-from foottrack_client.errors import ClientError, NoAnswer, NotReady, RequestFailed
+from foottrack_client.errors import ClientError, KeyFileError, NoAnswer, NotReady, RequestFailed
+from foottrack_client.keys import Keys
 from foottrack_client.publisher import Publisher
 from foottrack_client.receiver import Statistics, TopicStatistics
 
@@ -27,6 +28,8 @@ __all__ = [
     "ClientError",
     "Clock",
     "Endpoints",
+    "KeyFileError",
+    "Keys",
     "NoAnswer",
     "NotReady",
     "Publisher",

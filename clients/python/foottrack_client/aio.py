@@ -16,6 +16,7 @@ from foottrack_client.blocking import prefixes
 from foottrack_client.clock import ANSWER_TIMEOUT_S, BURST, PERIOD_S, Clock, Exchange
 from foottrack_client.endpoints import HWM, Endpoints, set_up
 from foottrack_client.errors import NoAnswer, NotReady, RequestFailed
+from foottrack_client.keys import Keys
 from foottrack_client.publisher import Publisher
 from foottrack_client.receiver import Receiver, Statistics, newest
 from foottrack_client.requests import request_of, result_of
@@ -33,17 +34,23 @@ _LOOK_S = 0.01
 class AsyncSubscription:
     """Messages of the topics asked for, in order. Belongs to one event loop."""
 
-    def __init__(self, context: zmq.asyncio.Context, endpoint: str, prefixes: Iterable[str], clock: Clock) -> None:
-        self._endpoint = endpoint
+    def __init__(
+        self,
+        context: zmq.asyncio.Context,
+        endpoint: str,
+        prefixes: Iterable[str],
+        clock: Clock,
+        keys: Keys | None = None,
+    ) -> None:
         self._waiting: deque[Message] = deque()
         self._socket = context.socket(zmq.SUB)
         # Awaiting each message on its own costs seven times what taking all that are there does.
         self._plain: zmq.Socket[bytes] = zmq.Socket.shadow(self._socket.underlying)
         self._receiver = Receiver(clock, self._socket.subscribe, self._socket.unsubscribe)
-        set_up(self._socket, endpoint)
+        set_up(self._socket, endpoint, keys)
         for prefix in (WELCOME.decode(), *prefixes):
             self._socket.subscribe(prefix)
-        self._revival = Revival(self._socket, endpoint)
+        self._revival = Revival(self._socket, endpoint, keys is not None)
         self._socket.connect(endpoint)
 
     @property
@@ -58,7 +65,7 @@ class AsyncSubscription:
                 while self.statistics.connections == 0:
                     await self._receive()
         except TimeoutError:
-            raise NotReady(f"no bus answers at {self._endpoint}: is the service running?") from None
+            raise NotReady(self._revival.why_not) from None
 
     async def receive(self) -> Message:
         """The next message."""
@@ -118,11 +125,13 @@ class AsyncClient:
         *,
         user: str = DEFAULT_USER,
         same_host: bool = True,
+        keys: Keys | None = None,
         context: zmq.Context[zmq.Socket[bytes]] | None = None,
     ) -> None:
         self.endpoints = endpoints
         self.user = user
         self.clock = Clock(same_host)
+        self._keys = keys
         self._plain: zmq.Context[zmq.Socket[bytes]] = context or zmq.Context()
         self._context = zmq.asyncio.Context.shadow(self._plain)
         self._own_context = context is None
@@ -131,20 +140,20 @@ class AsyncClient:
     def subscribe(self, *streams: str) -> AsyncSubscription:
         """As ``Client.subscribe``."""
         wanted = prefixes(self.user, streams)
-        subscription = AsyncSubscription(self._context, self.endpoints.egress, wanted, self.clock)
+        subscription = AsyncSubscription(self._context, self.endpoints.egress, wanted, self.clock, self._keys)
         self._made.append(subscription)
         return subscription
 
     async def publisher(self, src: str, timeout_s: float = 5.0) -> Publisher:
         """A source of messages called ``src``, ready. It never blocks. Raises NotReady."""
-        publisher = Publisher(self._plain, self.endpoints.ingress, src, self.user, self.clock)
+        publisher = Publisher(self._plain, self.endpoints.ingress, src, self.user, self.clock, self._keys)
         self._made.append(publisher)
         try:
             async with asyncio.timeout(timeout_s):
                 while not publisher.live:  # noqa: ASYNC110 - only the socket itself can tell
                     await asyncio.sleep(_LOOK_S)
         except TimeoutError:
-            raise NotReady(f"no bus answers at {self.endpoints.ingress}: is the service running?") from None
+            raise NotReady(publisher.why_not) from None
         return publisher
 
     async def request(self, cmd: str, timeout_s: float = 2.0, **args: Any) -> Any:
@@ -201,7 +210,7 @@ class AsyncClient:
     def _control(self) -> zmq.asyncio.Socket:
         """A new socket: one that was not answered is stuck, and nothing waits in this one for later."""
         socket = self._context.socket(zmq.REQ)
-        set_up(socket, self.endpoints.control)
+        set_up(socket, self.endpoints.control, self._keys)
         socket.connect(self.endpoints.control)
         return socket
 

@@ -14,6 +14,7 @@ import zmq
 from foottrack_client.clock import ANSWER_TIMEOUT_S, BURST, Clock, Exchange
 from foottrack_client.endpoints import HWM, Endpoints, set_up
 from foottrack_client.errors import NoAnswer, NotReady, RequestFailed
+from foottrack_client.keys import Keys
 from foottrack_client.publisher import Publisher
 from foottrack_client.receiver import Receiver, Statistics, newest
 from foottrack_client.requests import request_of, result_of
@@ -28,15 +29,16 @@ Context = zmq.Context[zmq.Socket[bytes]]
 class Subscription:
     """Messages of the topics asked for, in order. An iterator that never ends by itself; belongs to one thread."""
 
-    def __init__(self, context: Context, endpoint: str, prefixes: Iterable[str], clock: Clock) -> None:
-        self._endpoint = endpoint
+    def __init__(
+        self, context: Context, endpoint: str, prefixes: Iterable[str], clock: Clock, keys: Keys | None = None
+    ) -> None:
         self._waiting: deque[Message] = deque()
         self._socket = context.socket(zmq.SUB)
         self._receiver = Receiver(clock, self._socket.subscribe, self._socket.unsubscribe)
-        set_up(self._socket, endpoint)
+        set_up(self._socket, endpoint, keys)
         for prefix in (WELCOME.decode(), *prefixes):
             self._socket.subscribe(prefix)
-        self._revival = Revival(self._socket, endpoint)
+        self._revival = Revival(self._socket, endpoint, keys is not None)
         self._socket.connect(endpoint)
 
     @property
@@ -49,7 +51,7 @@ class Subscription:
         deadline = time.monotonic() + timeout_s
         while self.statistics.connections == 0:
             if not self._receive(deadline - time.monotonic()):
-                raise NotReady(f"no bus answers at {self._endpoint}: is the service running?")
+                raise NotReady(self._revival.why_not)
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
         """The next message, or None when none came in time. Without a timeout it waits for ever."""
@@ -104,7 +106,8 @@ class Subscription:
 class Client:
     """A service's client. Makes subscriptions and publishers, and asks. Closes what it made.
 
-    ``clock`` is the bus clock; on another host than the service's, ``synchronise`` every 2 s keeps it.
+    ``clock`` is the bus clock; on another host than the service's, ``synchronise`` every 2 s keeps it. There, ``keys``
+    make the connections encrypted, and ``endpoints`` are the service's encrypted ones; or a relay stands in for it.
     """
 
     def __init__(
@@ -113,24 +116,28 @@ class Client:
         *,
         user: str = DEFAULT_USER,
         same_host: bool = True,
+        keys: Keys | None = None,
         context: Context | None = None,
     ) -> None:
         self.endpoints = endpoints
         self.user = user
         self.clock = Clock(same_host)
+        self._keys = keys
         self._context: Context = context or zmq.Context()
         self._own_context = context is None
         self._made: list[Subscription | Publisher] = []
 
     def subscribe(self, *streams: str) -> Subscription:
         """The user's streams, such as "pose/body"; "sys/..." are the service's; none is everything of the user."""
-        subscription = Subscription(self._context, self.endpoints.egress, prefixes(self.user, streams), self.clock)
+        subscription = Subscription(
+            self._context, self.endpoints.egress, prefixes(self.user, streams), self.clock, self._keys
+        )
         self._made.append(subscription)
         return subscription
 
     def publisher(self, src: str) -> Publisher:
         """A source of messages called ``src``."""
-        publisher = Publisher(self._context, self.endpoints.ingress, src, self.user, self.clock)
+        publisher = Publisher(self._context, self.endpoints.ingress, src, self.user, self.clock, self._keys)
         self._made.append(publisher)
         return publisher
 
@@ -177,7 +184,7 @@ class Client:
     def _control(self) -> zmq.Socket[bytes]:
         """A new socket: one that was not answered is stuck, and nothing waits in this one for later."""
         socket = self._context.socket(zmq.REQ)
-        set_up(socket, self.endpoints.control)
+        set_up(socket, self.endpoints.control, self._keys)
         socket.connect(self.endpoints.control)
         return socket
 

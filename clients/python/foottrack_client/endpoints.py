@@ -6,9 +6,13 @@ from typing import Any, NamedTuple, Self
 
 import zmq
 
+from foottrack_client.keys import Keys
+
 HWM = 10_000
 """Messages that a socket holds; what does not fit shows as a gap in ``seq``."""
 MAX_FRAME_BYTES = 4 * 1024 * 1024
+HEARTBEAT_MS = 1_000
+HEARTBEAT_TIMEOUT_MS = 5_000
 
 
 class Endpoints(NamedTuple):
@@ -27,8 +31,15 @@ class Endpoints(NamedTuple):
         return cls(*(f"{head}:{int(port) + n}" for n in range(3)))
 
 
-def set_up(socket: zmq.Socket[Any], endpoint: str) -> None:
+def set_up(socket: zmq.Socket[Any], endpoint: str, keys: Keys | None) -> None:
     """Limits and options that all our sockets have; to be called before connecting."""
+    if keys is not None:
+        socket.curve_publickey = keys.public.encode()
+        socket.curve_secretkey = keys.secret.encode()
+        socket.curve_serverkey = keys.service.encode()
+        # A host that is switched off says no goodbye.
+        socket.setsockopt(zmq.HEARTBEAT_IVL, HEARTBEAT_MS)
+        socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, HEARTBEAT_TIMEOUT_MS)
     socket.set_hwm(HWM)
     socket.setsockopt(zmq.MAXMSGSIZE, MAX_FRAME_BYTES)
     socket.setsockopt(zmq.LINGER, 0)

@@ -4,6 +4,7 @@
 
     ClientError
     ├── NotReady         no bus answered in time
+    ├── KeyFileError     a key file is missing or unfit
     └── RequestFailed    the service refused a request; ``code`` says why (SPEC, section 7)
         └── NoAnswer     it did not answer at all
 """
@@ -17,6 +18,10 @@ class ClientError(Exception):
 
 class NotReady(ClientError):
     """The bus was not there within the time given."""
+
+
+class KeyFileError(ClientError):
+    """A key file cannot be used."""
 
 
 class RequestFailed(ClientError):

@@ -12,6 +12,7 @@ import zmq
 from foottrack_client.clock import Clock
 from foottrack_client.endpoints import set_up
 from foottrack_client.errors import NotReady
+from foottrack_client.keys import Keys
 from foottrack_client.revival import PATIENCE_S, Revival
 from foottrack_protocol import Message, encode
 
@@ -26,10 +27,17 @@ class Publisher:
     a gap in ``seq``.
     """
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], endpoint: str, src: str, user: str, clock: Clock):
+    def __init__(
+        self,
+        context: zmq.Context[zmq.Socket[bytes]],
+        endpoint: str,
+        src: str,
+        user: str,
+        clock: Clock,
+        keys: Keys | None = None,
+    ) -> None:
         self.sent = 0
         self.drops: Counter[str] = Counter()
-        self._endpoint = endpoint
         self._src = src
         self._sid = uuid.uuid4().hex[:12]
         self._user = user
@@ -37,11 +45,11 @@ class Publisher:
         self._seq: Counter[str] = Counter()
         self._live = False
         self._socket = context.socket(zmq.XPUB)
-        set_up(self._socket, endpoint)
+        set_up(self._socket, endpoint, keys)
         # The socket reports a lost bus instead of keeping stale samples for it, and a full queue instead of dropping.
         self._socket.setsockopt(zmq.IMMEDIATE, 1)
         self._socket.setsockopt(zmq.XPUB_NODROP, 1)
-        self._revival = Revival(self._socket, endpoint)
+        self._revival = Revival(self._socket, endpoint, keys is not None)
         self._socket.connect(endpoint)
 
     @property
@@ -58,13 +66,18 @@ class Publisher:
             self._revival.check()
         return self._live
 
+    @property
+    def why_not(self) -> str:
+        """Why the bus is not there, for a person."""
+        return self._revival.why_not
+
     def wait_ready(self, timeout_s: float = 5.0) -> None:
         """Wait until the bus is there: nothing published after that is lost to a slow start. Raises NotReady."""
         deadline = self._clock.own() + int(timeout_s * 1e9)
         while not self.live:
             left_ms = (deadline - self._clock.own()) // 1_000_000
             if not self._socket.poll(max(0, min(left_ms, int(PATIENCE_S * 1000)))) and left_ms <= 0:
-                raise NotReady(f"no bus answers at {self._endpoint}: is the service running?")
+                raise NotReady(self.why_not)
 
     def publish(self, stream: str, data: Any, *, t: int | None = None, valid: bool = True) -> bool:
         """Publish a body that was true at ``t`` (bus clock, ns; now if absent). Says whether the bus took it.
