@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
 import sys
 import threading
@@ -34,6 +35,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def _nobodys_calibrations(tmp_path_factory: pytest.TempPathFactory) -> None:
     """No test knows what the person who runs it has calibrated."""
     os.environ[FOLDER_VARIABLE] = str(tmp_path_factory.mktemp("calibrations"))
+
+
+@pytest.fixture(autouse=True)
+def _logging_ends_with_its_command() -> Iterator[None]:
+    """A command that is run within a test logs to a stream that is closed with it."""
+    yield
+    root = logging.getLogger()
+    for handler in [each for each in root.handlers if type(each) is logging.StreamHandler]:
+        root.removeHandler(handler)
 
 
 @pytest.fixture(scope="session", autouse=True)
