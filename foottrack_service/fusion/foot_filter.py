@@ -30,7 +30,7 @@ from foottrack_service.fusion.ladder import BALL_68_OF_ONE_AXIS, Ladder
 from foottrack_service.fusion.pictures_only import PicturesOnlyFilter
 from foottrack_service.rotations import IDENTITY, Array
 
-SYSTEMATIC = 0.003
+SYSTEMATIC = 0.002
 """m per axis: what no amount of agreeing fixes takes away (lens, depth scale, head pose, where the tag is glued)."""
 SEEN_S = 0.3
 """A fix accepted so recently shows that its foot is still tracked by its own."""

@@ -31,6 +31,9 @@ FLOOR = 13
 MEAN_RATE = 14
 """1 when GYRO is the mean rate since the last sample (increments of the device's q) and no instantaneous one."""
 
+WANDER = 15
+"""rad/sqrt(s): by how much GYRO's tilt wanders beyond a gyro's noise."""
+
 # An optical fix, stage.
 POINT = 1
 POINT_COV = 4

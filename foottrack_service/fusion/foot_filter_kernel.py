@@ -39,10 +39,6 @@ GYRO_NOISE = 0.001
 """rad/s/sqrt(Hz)."""
 GYRO_SCALE = 0.0005
 """1/sqrt(Hz), per rad/s: scale factor and misalignment."""
-FUSED_TILT = 0.02
-"""rad/sqrt(s) that a device's own idea of what is upright adds while it moves: 1.4 deg that change within 2 s."""
-FULL_EFFORT = 5.0
-"""m/s^2 beyond gravity at which all of that is there."""
 ACC_BIAS_WALK = 0.0005
 """m/s^2/sqrt(s)."""
 GYRO_BIAS_WALK = 0.00002
@@ -116,12 +112,12 @@ def turn_stage(q: Array, rx: float, ry: float, rz: float) -> None:
 
 @compiled
 def propagate(
-    x: Array, P: Array, acc: Sequence3, gyro: Sequence3, step: float, clipped: bool, fused: bool, dt: float
+    x: Array, P: Array, acc: Sequence3, gyro: Sequence3, step: float, clipped: bool, wander: float, dt: float
 ) -> None:
     """Carry x and P forward by dt, s, in place.
 
     ``acc`` (m/s^2) and ``gyro`` (rad/s) are means over the interval, ``step`` (m/s^2) is how far the specific force
-    moved within it. ``fused``: the rate is the increment of the device's own attitude.
+    moved within it. ``wander``, rad/sqrt(s): what the tilt is unsure by beyond a gyro's noise.
     """
     q = x[6:10]
     f = (acc[0] - x[10], acc[1] - x[11], acc[2] - x[12])
@@ -149,8 +145,7 @@ def propagate(
     sigma_a = ACC_NOISE + ACC_SCALE * felt + ACC_STEP * step + (ACC_CLIPPED if clipped else 0.0)
     sigma_w = GYRO_NOISE + GYRO_SCALE * rate
     sigma_yaw = sigma_w
-    if fused:
-        sigma_w += FUSED_TILT * min(1.0, felt / FULL_EFFORT)
+    sigma_w += wander
     qa = sigma_a * sigma_a * dt
     for i in range(3):
         P[i, i] += qa * dt * dt / 3.0

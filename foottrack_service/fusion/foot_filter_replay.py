@@ -33,6 +33,7 @@ from foottrack_service.fusion.foot_filter_events import (
     TILT_SIGMA,
     TURN_SIGMA,
     UP,
+    WANDER,
     YAW_SIGMA,
     ZERO_SIGMA,
     Stamps,
@@ -204,7 +205,7 @@ def _advance(t: Stamps, rows: Array, x: Array, P: Array, i: int, end: int, dt: f
     fused = rows[after, MEAN_RATE] == 1.0
     if (t[after] - t[before]) * 1e-9 <= HOLE_S and dt <= HOLE_S:
         clipped = rows[before, CLIPPED] == 1.0 or rows[after, CLIPPED] == 1.0
-        propagate(x, P, acc, gyro, math.sqrt(step), clipped, fused, dt)
+        propagate(x, P, acc, gyro, math.sqrt(step), clipped, rows[after, WANDER], dt)
     else:
         _coast(x, P, gyro, fused, dt)
 

@@ -72,7 +72,9 @@ def fed(latency_ms: int) -> InertialFilter:
 
 def test_a_late_fix_ends_where_a_punctual_one_does() -> None:
     punctual, late = fed(5).state, fed(60).state
-    assert np.allclose(punctual[0], late[0], atol=5e-3)
+    assert np.allclose(punctual[0][:10], late[0][:10], atol=5e-3)
+    # Such pushes say little about the biases.
+    assert np.allclose(punctual[0][10:], late[0][10:], atol=2e-2)
     assert np.allclose(punctual[1], late[1], rtol=0.3, atol=1e-5)
 
 
