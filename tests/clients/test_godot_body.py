@@ -137,6 +137,16 @@ def test_what_is_not_known_hangs_at_rest(godot: GodotProject, unknown: str) -> N
         assert at(said, "LeftFoot")[0] < 0.0
 
 
+def test_a_foot_that_is_lost_does_not_hang_through_the_floor(godot: GodotProject) -> None:
+    hips = Pose(p=(0.0, 0.55, 0.0), q=UPRIGHT)
+    right = leg(hips, 0.1, Pose(p=(0.1, USER_ANKLE_M, 0.0), q=UPRIGHT))
+    left = leg(hips, -0.1, Pose(p=(-0.1, USER_ANKLE_M, 0.0), q=UPRIGHT), stage="lost")
+    said = pose_avatar(godot, "pose/body", BodyPose(hips=hips, left=left, right=right))
+    standing = AVATAR_ANKLE_M * said["scale"]
+    assert at(said, "Hips")[1] < 0.7
+    assert [at(said, f"{side}Foot")[1] for side in ("Left", "Right")] == pytest.approx([standing] * 2, abs=2e-3)
+
+
 def test_the_walker_walks_along_his_heading_with_planted_feet_on_the_floor(godot: GodotProject) -> None:
     heading = (-1.0, 0.0, 0.0)
     targets = IkTargets(

@@ -108,8 +108,11 @@ func _track() -> void:
 	if body.get("hips") != null:
 		hips = hips.interpolate_with(_placed(to_skeleton, body["hips"], lift), weight)
 	_humanoid.pose_hips(skeleton, hips)
+	var standing := to_skeleton.origin.y + _humanoid.ankle_height()
 	for side: String in Humanoid.SIDES:
 		var ankle := _humanoid.ankle_below(hips, side)
+		# Below hips that are low it would hang through the floor.
+		ankle.origin.y = maxf(ankle.origin.y, standing)
 		weight = _weight(side, ankles.has(side))
 		if ankles.has(side):
 			ankle = ankle.interpolate_with(ankles[side], weight)
