@@ -42,6 +42,8 @@ class BodySolver:
 
     def __init__(self, skeleton: Skeleton, solver: Solver = "two-bone") -> None:
         self._facing = PelvisFacing()
+        self.yaw = 0.0
+        """What ``face`` found last."""
         self._solver = solver
         self.skeleton = skeleton
 
@@ -59,11 +61,19 @@ class BodySolver:
         """The stage moved: what was known of the facing does not hold."""
         self._facing.reset()
 
+    def face(self, t: int, head_q: Sequence[float] | None, feet: Mapping[Side, FootPlace]) -> float:
+        """Where the pelvis faces at ``t`` (ns, rising), rad, 0 towards -Z, positive to the left.
+
+        From a head (q head to stage) and feet, as far as they are known. ``solve`` asks it itself.
+        """
+        head = None if head_q is None else head_yaw(head_q)
+        self.yaw = self._facing.update(t, head, [foot_yaw(foot.q) for foot in feet.values()])
+        return self.yaw
+
     def solve(self, t: int, head_p: Sequence[float], head_q: Sequence[float], feet: Mapping[Side, FootPlace]) -> Legs:
         """The body at ``t`` (ns, rising) of a head (m, stage; q head to stage) over these feet."""
         body = self._skeleton
-        yaw = self._facing.update(t, head_yaw(head_q), [foot_yaw(foot.q) for foot in feet.values()])
-        facing = Facing.of(yaw)
+        facing = Facing.of(self.face(t, head_q, feet))
         ankles = {side: foot.p for side, foot in feet.items()}
         axes = {side: knee_axis(facing.right, facing.forward, foot.q) for side, foot in feet.items()}
         top = posture.neck(head_p, head_q)

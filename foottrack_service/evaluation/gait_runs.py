@@ -11,6 +11,7 @@ import numpy as np
 from foottrack_protocol import Message
 from foottrack_protocol.frames import SIDES
 from foottrack_protocol.messages import BodyPose, FootPose, Side
+from foottrack_service.body.facing import head_yaw
 from foottrack_service.body.skeleton import Skeleton
 from foottrack_service.config import Settings
 from foottrack_service.fusion.core import FusionCore
@@ -33,6 +34,8 @@ class Instant(NamedTuple):
     left: FootSample | None
     right: FootSample | None
     head: HeadSample | None
+    yaw: float = 0.0
+    """Of the pelvis, rad."""
 
 
 class Event(NamedTuple):
@@ -79,8 +82,8 @@ def run_gait(instants: Iterable[Instant], settings: Settings, mode: Mode = "ours
     lifted: dict[Side, list[float]] = {"left": [], "right": []}
     up = {"left": False, "right": False}
     steps = 0
-    for at, left, right, head in instants:
-        out = gait.update(at, left, right, head)
+    for at, left, right, head, yaw in instants:
+        out = gait.update(at, left, right, head, yaw)
         t, ik = at * 1e-9, out.ik
         rows.append((t, -ik.left.p[2], ik.left.p[1], -ik.right.p[2], ik.right.p[1], ik.speed, out.state.cadence))
         events += [Event(when * 1e-9, t, event.side, event.event) for when, event in out.events]
@@ -109,7 +112,8 @@ def run_gait(instants: Iterable[Instant], settings: Settings, mode: Mode = "ours
 def _instant(message: Message) -> Instant:
     body: BodyPose = message.data
     head = None if body.head is None else HeadSample(body.head.p, body.head.q)
-    return Instant(message.t, _foot(body.left), _foot(body.right), head)
+    yaw = 0.0 if body.hips is None else head_yaw(body.hips.q)
+    return Instant(message.t, _foot(body.left), _foot(body.right), head, yaw)
 
 
 def _foot(foot: FootPose | None) -> FootSample | None:

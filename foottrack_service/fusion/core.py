@@ -190,8 +190,10 @@ class FusionCore:
         if head is not None and abs(now - head.t) * 1e-9 > MAX_HEAD_GAP_S:
             head = None
         legs = None
-        if head is not None:
-            places = {side: FootPlace(_vec(found.p), _quat(found.q)) for side, found in feet.items()}
+        places = {side: FootPlace(_vec(found.p), _quat(found.q)) for side, found in feet.items()}
+        if head is None:
+            self._body.face(now, None, places)
+        else:
             legs = self._body.solve(now, head.p.tolist(), head.q.tolist(), places)
         body = BodyPose(
             head=None if head is None else _pose(head.p, head.q),
@@ -200,7 +202,8 @@ class FusionCore:
             right=self._foot_pose("right", feet.get("right"), legs),
         )
         pose = self._message("pose/body", now, now, body)
-        gait = self._gait.update(now, feet, {side: foot.imu_t for side, foot in self._feet.items()}, head)
+        imu_t = {side: foot.imu_t for side, foot in self._feet.items()}
+        gait = self._gait.update(now, feet, imu_t, head, self._body.yaw)
         return [
             pose,
             self._message("pose/ik", now, now, gait.ik),

@@ -28,11 +28,16 @@ class GaitLink:
             self._wearer, self._gait = found, Gait(found, self._settings.gait)
 
     def update(
-        self, now: int, feet: Mapping[Side, FootEstimate], imu_t: Mapping[Side, int | None], head: HeadSample | None
+        self,
+        now: int,
+        feet: Mapping[Side, FootEstimate],
+        imu_t: Mapping[Side, int | None],
+        head: HeadSample | None,
+        yaw: float,
     ) -> samples.GaitOutputs:
-        """The gait at ``now`` ns; ``imu_t``: when each foot's IMU was last heard, ns."""
+        """The gait at ``now`` ns; ``imu_t``: when each foot's IMU was last heard, ns; ``yaw`` of the pelvis, rad."""
         left, right = (foot_sample(feet.get(side), now, imu_t[side]) for side in SIDES)
-        return self._gait.update(now, left, right, head_sample(head))
+        return self._gait.update(now, left, right, head_sample(head), yaw)
 
 
 def wearer(settings: Settings, skeleton: Skeleton) -> samples.Wearer:

@@ -7,7 +7,6 @@ import math
 from foottrack_protocol.messages import FootGait, GaitEvent, GaitState, IkFoot, IkTargets, Side
 from foottrack_service.gait.foot_phases import FootPhases
 from foottrack_service.gait.head_bob import HeadBob
-from foottrack_service.gait.heading import Heading
 from foottrack_service.gait.keyframe import KeyframeLegs
 from foottrack_service.gait.legs import Legs, LegTarget, LegTargets
 from foottrack_service.gait.reference import ReferenceLegs
@@ -34,20 +33,23 @@ class Gait:
         self._steps = Steps(self._feet, make_model(settings.speed, wearer.height), settings.most_speed)
         self.legs = _make_legs(settings, wearer)
         """What moves the avatar's legs."""
-        self._heading = Heading()
         self._bob = HeadBob(wearer.height)
         self._alone_since: int | None = None
         self._alone = False
         self._t: int | None = None
 
-    def update(self, t: int, left: FootSample | None, right: FootSample | None, head: HeadSample | None) -> GaitOutputs:
-        """The gait at ``t`` ns, which never falls; what is not known is None."""
+    def update(
+        self, t: int, left: FootSample | None, right: FootSample | None, head: HeadSample | None, yaw: float
+    ) -> GaitOutputs:
+        """The gait at ``t`` ns, which never falls; what is not known is None.
+
+        ``yaw``: where the pelvis faces in the stage, as the body has it, rad, 0 towards -Z, positive to the left.
+        """
         dt = 0.0 if self._t is None else (t - self._t) * 1e-9
         if not 0.0 <= dt < _HOLE_S:
             dt = 0.0
         self._t = t
         known_left, known_right = left is not None, right is not None
-        heading = self._heading.update(dt, left, right, head)
         if self._settings.headset_alone and self._on_head_alone(t, known_left or known_right, head):
             assert head is not None
             left, right = self._bob.update(t, head)
@@ -70,7 +72,7 @@ class Gait:
             (at, GaitEvent.model_validate({"side": side, "event": name, "step": number}))
             for at, name, side, number in happened
         )
-        return GaitOutputs(state, self._targets(legs, heading), events)
+        return GaitOutputs(state, self._targets(legs, (-math.sin(yaw), 0.0, -math.cos(yaw))), events)
 
     def _on_head_alone(self, t: int, feet: bool, head: HeadSample | None) -> bool:
         if feet or head is None:

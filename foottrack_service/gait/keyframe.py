@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from foottrack_service.gait.legs import LegTarget, LegTargets, pelvis_drop
 from foottrack_service.gait.steps import Feet, Steps
 
-CYCLE_S = 1.0
-"""Two steps: 12 frames each at 24 frames per second, [L]."""
-CLIP = (
-    # z m, ankle's height m, pitch rad (toes up); eighths of the cycle from contact
-    (0.30, 0.01, 0.25),
-    (0.15, 0.00, 0.00),
-    (0.00, 0.00, 0.00),
-    (-0.15, 0.01, -0.10),
-    (-0.30, 0.06, -0.45),
-    (-0.22, 0.14, -0.70),
-    (0.02, 0.12, -0.25),
-    (0.24, 0.05, 0.20),
-)
-"""One foot, [L]'s contact, down, pass and up; the other is half a cycle later."""
+PRESET = "animator"
+"""The walk cycle of the textbook's four poses [L]."""
+FRAMES, FRAMES_PER_S = 24, 24.0
+"""Two steps of 12 frames each [L]."""
+CYCLE_S = FRAMES / FRAMES_PER_S
 _BLEND_S = 0.15
 _HOLD_S = 0.3
 """Between two swings the clip waits so long for the next before the legs go back to the stand."""
@@ -29,6 +22,7 @@ class KeyframeLegs:
 
     def __init__(self, leg: float) -> None:
         self._leg = leg
+        self._clip = clip(leg)
         self._clock = 0.0
         self._weight = 0.0
         self._idle_s = _HOLD_S
@@ -47,8 +41,26 @@ class KeyframeLegs:
         return LegTargets(left, right, -drop, steps.speed(t), steps.walking)
 
     def _foot(self, share: float) -> LegTarget:
-        at = (share % 1.0) * len(CLIP)
-        key = int(at) % len(CLIP)
-        before, after, between = CLIP[key], CLIP[(key + 1) % len(CLIP)], at - int(at)
+        at = (share % 1.0) * FRAMES
+        frame, between = int(at) % FRAMES, at - int(at)
+        before, after = self._clip[frame], self._clip[(frame + 1) % FRAMES]
         z, y, pitch = ((a + (b - a) * between) * self._weight for a, b in zip(before, after, strict=True))
         return LegTarget(z, y, pitch)
+
+
+@lru_cache(maxsize=4)
+def clip(leg: float) -> tuple[LegTarget, ...]:
+    """One foot through the cycle, from its strike on, for legs of this length, m; the other is half a cycle later."""
+    # Here, since few choose this mode and scipy takes its time.
+    from foottrack_service.walkcycle.cycle import build_cycle
+    from foottrack_service.walkcycle.inplace import in_place_targets
+    from foottrack_service.walkcycle.presets import preset
+
+    cycle = build_cycle(preset(PRESET))
+    scale = leg / cycle.body.leg
+    foot = in_place_targets(cycle, [frame / FRAMES for frame in range(FRAMES)]).feet["left"]
+    standing = cycle.body.ankle_height
+    return tuple(
+        LegTarget(scale * z, scale * max(0.0, y - standing), pitch)
+        for (_, y, z), pitch in zip(foot.ankle.tolist(), foot.pitch.tolist(), strict=True)
+    )

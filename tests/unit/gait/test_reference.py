@@ -106,7 +106,7 @@ def test_defect_a_lift_is_seen_late():
     rose = []
     for k in range(1200):
         t = k / 200
-        gait.update(round(t * 1e9), left.sample(t), right.sample(t), None)
+        gait.update(round(t * 1e9), left.sample(t), right.sample(t), None, 0.0)
         if gait.legs.phases[0].phase == "ascending" and (not rose or t - rose[-1] > 0.8):
             rose.append(t)
     delays = [t - max(begin for begin in left.begins if begin < t) for t in rose]

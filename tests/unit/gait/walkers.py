@@ -61,7 +61,7 @@ def feed(gait, left, right, seconds, head=None, begin=0.0):
     for k in range(round(begin * HZ), round(seconds * HZ)):
         t = k / HZ
         feet = [None if foot is None else foot.sample(t) for foot in (left, right)]
-        outs.append((t, gait.update(round(t * 1e9), *feet, None if head is None else head(t))))
+        outs.append((t, gait.update(round(t * 1e9), *feet, None if head is None else head(t), 0.0)))
     return outs
 
 
