@@ -23,6 +23,7 @@ namespace Foottrack
         private readonly int _port;
         private readonly string _socketType;
         private readonly Thread _thread;
+        private readonly byte[] _incoming = new byte[ZmtpStream.BufferBytes];
         private volatile ZmtpConnection _connection;
         private volatile string _fault = "";
         private volatile bool _ready;
@@ -111,7 +112,7 @@ namespace Foottrack
         {
             try
             {
-                using (_connection = new ZmtpConnection(_host, _port, _socketType, Stopping))
+                using (_connection = new ZmtpConnection(_host, _port, _socketType, Stopping, _incoming))
                 {
                     Interlocked.Increment(ref _connections);
                     _fault = "";

@@ -31,9 +31,9 @@ namespace Foottrack
         private readonly byte[] _out = new byte[9 + 256];
 
         /// <summary>Connects and shakes hands. Throws LinkException or SocketException.</summary>
-        public ZmtpConnection(string host, int port, string socketType, WaitHandle stop)
+        public ZmtpConnection(string host, int port, string socketType, WaitHandle stop, byte[] buffer)
         {
-            _stream = new ZmtpStream(host, port, stop);
+            _stream = new ZmtpStream(host, port, stop, buffer);
             try
             {
                 Greet();

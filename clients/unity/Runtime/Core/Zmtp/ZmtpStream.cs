@@ -15,17 +15,19 @@ namespace Foottrack
         public const int StallMs = 5000;
         private const int SliceMs = 50;
         private const int SendMs = 1000;
-        private const int BufferBytes = 64 * 1024;
+        public const int BufferBytes = 64 * 1024;
 
         private readonly Socket _socket;
         private readonly WaitHandle _stop;
-        private readonly byte[] _in = new byte[BufferBytes];
+        private readonly byte[] _in;
         private int _from;
         private int _to;
 
-        public ZmtpStream(string host, int port, WaitHandle stop)
+        /// <summary>`buffer` is for what comes: its owner lends it to one connection after another.</summary>
+        public ZmtpStream(string host, int port, WaitHandle stop, byte[] buffer)
         {
             _stop = stop;
+            _in = buffer;
             Where = host + ":" + port;
             _socket = Open(Resolve(host), port);
         }
