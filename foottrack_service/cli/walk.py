@@ -22,7 +22,7 @@ from foottrack_service.cli.running import (
     run_loop,
     settings_for,
 )
-from foottrack_service.cli.walk_source import cycle_of, knobs, project_of, walk_of
+from foottrack_service.cli.walk_source import cycle_of, knobs, motion_facts, project_of, walk_of
 
 if TYPE_CHECKING:
     from foottrack_service.walkcycle.project import Project
@@ -113,15 +113,21 @@ def show(
     schema: Annotated[bool, typer.Option("--schema", help="The JSON schema of project files instead.")] = False,
     json: JsonOption = False,
 ) -> None:
-    """Stride, speed, contacts and poses of a walk.
+    """Stride, speed, contacts and poses of a walk; or what a written .bvh or .glb holds.
 
-    Examples: foottrack walk show sneak; foottrack walk show mine.json --json
+    Examples: foottrack walk show sneak; foottrack walk show mine.json --json; foottrack walk show walk.bvh
     """
     from foottrack_service.walkcycle.cycle import build_cycle
     from foottrack_service.walkcycle.project import Project
 
     if schema:
         print_json(Project.model_json_schema())
+        return
+    if (held := motion_facts(Path(source))) is not None:
+        if json:
+            print_json(held)
+        else:
+            typer.echo(f"{source}: {held['joints']} joints, {held['frames']} frames, {held['seconds']:.2f} s")
         return
     project = project_of(source)
     cycle = build_cycle(project)
@@ -315,4 +321,4 @@ def _report(out: Path, walk: Walk, json: bool) -> None:
     if json:
         print_json(facts)
     else:
-        typer.echo(f"Wrote {out}: {strikes} steps, {walk.duration:.2f} s.", err=True)
+        typer.echo(f"Wrote {out}: {strikes - 1} steps and the one that closes, {walk.duration:.2f} s.", err=True)

@@ -28,9 +28,36 @@ def project_of(source: str, parameters: Parameters | None = None) -> Project:
             raise CommandFailed(f"{source}: {getattr(error, 'strerror', None) or error}", EXIT_USAGE) from None
         except ProjectError as error:
             raise ProjectError(f"{source}: {error}") from None
+    elif source.lower().endswith((".bvh", ".glb")):
+        raise CommandFailed(f"{source} holds a motion; key poses are in a project, FILE.json", EXIT_USAGE)
     else:
         project = preset(source)
     return with_parameters(project, parameters) if parameters is not None else project
+
+
+def motion_facts(file: Path) -> dict[str, object] | None:
+    """What a BVH or GLB holds; None for a file of another kind. Raises CommandFailed, MotionFileError."""
+    from foottrack_service.walkcycle.bvh import parse_bvh
+    from foottrack_service.walkcycle.errors import MotionFileError
+    from foottrack_service.walkcycle.glb import parse_glb
+    from foottrack_service.walkcycle.skeleton import JOINTS
+
+    ending = file.suffix.lower()
+    if ending not in (".bvh", ".glb"):
+        return None
+    try:
+        data = file.read_bytes()
+        if ending == ".bvh":
+            found = parse_bvh(data.decode("utf-8"))
+            joints, motion = len(found.names), found.motion
+        else:
+            joints, motion = len(JOINTS), parse_glb(data)
+    except (OSError, UnicodeDecodeError) as error:
+        raise CommandFailed(f"{file}: {getattr(error, 'strerror', None) or error}", EXIT_USAGE) from None
+    except MotionFileError as error:
+        raise MotionFileError(f"{file}: {error}") from None
+    seconds = float(motion.times[-1] - motion.times[0])
+    return {"file": str(file), "joints": joints, "frames": len(motion.times), "seconds": seconds}
 
 
 def knobs(*values: float | None) -> Parameters | None:

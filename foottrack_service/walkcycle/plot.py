@@ -78,7 +78,7 @@ def plot_arcs(cycle: Cycle) -> Figure:
             xlabel="xyz"[h] + ", m",
             ylabel="xyz"[v] + ", m",
         )
-    axes.legend(fontsize=7)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
     return figure
 
 
@@ -114,7 +114,7 @@ def plot_footprints(walk: Walk) -> Figure:
     axes.set(
         aspect="equal", xlabel="x (left), m", ylabel="z, m", title=f"{walk.cycle.project.name}, {walk.duration:.1f} s"
     )
-    axes.legend(fontsize=7)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
     return figure
 
 

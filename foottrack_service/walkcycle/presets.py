@@ -61,8 +61,8 @@ def normative() -> Project:
             leg, hip = legs[side], hips[side]
             ankle = height + float(hip[1]) + leg.down
             pitch, toe = leg.pitch, leg.toe
-            if side == "right" and leg.rolls:
-                # A foot still behind has rolled halfway between what its angles and what that height say.
+            if leg.rolls:
+                # Halfway between what its angles and what the height of the pelvis say.
                 pitch = 0.5 * (pitch - _pitch_of_heel_rise(body, ankle))
                 toe = -pitch
             place = (sign * (_HALF_WIDTH_M - leg.whip), ankle, float(hip[2]) + leg.ahead)

@@ -103,6 +103,24 @@ def test_a_project_without_toes_names_the_pose(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["mine.json"]
 
 
+@pytest.mark.parametrize("ending", [".bvh", ".glb"])
+def test_show_reads_a_written_motion_and_names_where_it_is_broken(tmp_path: Path, ending: str) -> None:
+    walk = tmp_path / f"walk{ending}"
+    run_walk("along", "sneak", "--path", "line:3", "--fps", "30", "--out", str(walk))
+    held = json.loads(run_walk("show", str(walk), "--json").stdout)
+    assert held["joints"] == 22
+    assert held["frames"] >= 30.0 * held["seconds"]
+    refused = run_walk("along", str(walk), "--out", str(tmp_path / "again.bvh"))
+    assert refused.exit_code == 2
+    assert "key poses are in a project" in refused.stderr
+    # A number among the frames, or a byte of the header.
+    walk.write_bytes(walk.read_bytes()[:-4].rstrip() + b" x" if ending == ".bvh" else b"glTX" + walk.read_bytes()[4:])
+    broken = run_walk("show", str(walk))
+    assert broken.exit_code == 2
+    assert f"{walk}: {'BVH line ' if ending == '.bvh' else 'GLB: '}" in broken.stderr
+    assert [file.name for file in tmp_path.iterdir()] == [walk.name]
+
+
 @pytest.mark.parametrize("ending", [".txt", ".fbx", ""])
 def test_an_unknown_ending_is_refused(tmp_path: Path, ending: str) -> None:
     result = run_walk("along", "normative", "--out", str(tmp_path / f"walk{ending}"))
