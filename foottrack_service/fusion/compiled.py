@@ -13,11 +13,19 @@ from typing import Any, TypeVar, cast
 import numba
 import platformdirs
 
+_FEED_KERNELS = ("foot_filter_doubt.py", "foot_filter_events.py", "foot_filter_memory.py", "interface.py")
+"""Files without kernels, whose constants are compiled into some."""
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def compiled(function: F) -> F:
-    """The function, compiled at its first call. IEEE rules are kept: the same input gives the same bits."""
+    """The function, compiled at its first call. IEEE rules are kept: the same input gives the same bits.
+
+    Uncompiled it gives them too, as long as it uses neither ``math.hypot`` nor ``** 2`` on what varies.
+
+    Loops copy arrays: for ``a[:] = b`` numba compiles its message about shapes that differ, which takes five seconds.
+    """
     config: Any = numba.config
     before = config.CACHE_DIR
     config.CACHE_DIR = before or _CACHE
@@ -33,13 +41,19 @@ def is_compiled() -> bool:
     return any(Path(config.CACHE_DIR or _CACHE).rglob("*.nbi"))
 
 
+def compiling_is_off() -> bool:
+    """Whether NUMBA_DISABLE_JIT leaves all kernels to Python."""
+    config: Any = numba.config
+    return bool(config.DISABLE_JIT)
+
+
 def _cache_folder() -> str:
     # Numba renews a function's cache when its own file changes, but not when a constant or a function that it takes
     # from another file does: so the cache is named by all files of this room that have or feed kernels.
     digest = hashlib.sha256()
     for file in sorted(Path(__file__).parent.glob("*.py")):
         text = file.read_bytes()
-        if b"@compiled" in text or file.name == "foot_filter_events.py":
+        if b"@compiled" in text or file.name in _FEED_KERNELS:
             digest.update(text)
     return str(Path(platformdirs.user_cache_dir("foottrack", appauthor=False)) / f"kernels-{digest.hexdigest()[:16]}")
 

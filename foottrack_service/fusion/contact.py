@@ -10,13 +10,12 @@ standing, walking, soft soles and running.
 from __future__ import annotations
 
 import math
-from collections import deque
-
-import numpy as np
 
 from foottrack_service.fusion.compiled import compiled
+from foottrack_service.fusion.compiled_rotations import Vector, quaternion, rotation, squared, turned
 from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE, Stamps
-from foottrack_service.fusion.foot_filter_kernel import GRAVITY, Vector, rotation, turned
+from foottrack_service.fusion.foot_filter_kernel import GRAVITY
+from foottrack_service.fusion.foot_filter_memory import SEEN_KEPT, Foot
 from foottrack_service.rotations import Array
 
 WINDOW_NS = 80_000_000
@@ -106,9 +105,9 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
         memory[DOUBTED] = 0.0
         return 0.0
     # A smooth push sideways hardly changes |f|, but it shows against what the filter knows to be up.
-    a = turned(rotation(x[6:10]), (mean[0] - x[10], mean[1] - x[11], mean[2] - x[12]))
+    a = turned(rotation(quaternion(x, 6)), (mean[0] - x[10], mean[1] - x[11], mean[2] - x[12]))
     tilt = math.sqrt(P[6, 6] + P[8, 8])
-    pushed = math.sqrt(a[0] * a[0] + (a[1] - GRAVITY) ** 2 + a[2] * a[2])
+    pushed = math.sqrt(a[0] * a[0] + squared(a[1] - GRAVITY) + a[2] * a[2])
     if pushed > PUSH + PUSH_SHARE * statistic + 3.0 * GRAVITY * tilt:
         memory[DOUBTED] += dt
         if memory[DOUBTED] < DOUBT_S:
@@ -116,31 +115,39 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
     return STILL_SIGMA + SIGMA_GROWTH * statistic
 
 
-class SeenMotion:
-    """Whether accepted fixes of the last quarter of a second move: then the foot does not stand, however quiet it is.
+@compiled
+def see(s: Foot, t: int, point: Vector) -> None:
+    """An accepted fix at ``t``, ns, m, stage: do those of the last quarter of a second move?
 
-    Slow knee bends and a tracker in a hand are quiet, and no stance.
+    Then the foot does not stand, however quiet it is: slow knee bends and a tracker in a hand are quiet, and no stance.
+    ``seen_speed`` is 0 while they show none.
     """
-
-    def __init__(self) -> None:
-        self.speed = 0.0
-        """m/s; 0.0 while the fixes show none."""
-        self._seen: deque[tuple[int, Array]] = deque(maxlen=64)
-
-    def clear(self) -> None:
-        """Begin again."""
-        self.speed = 0.0
-        self._seen.clear()
-
-    def see(self, t: int, point: Array) -> None:
-        """An accepted fix at ``t``, ns, shape (3,), m, stage."""
-        seen = self._seen
-        seen.append((t, point))
-        while t - seen[0][0] > SEEN_SPAN_NS:
-            seen.popleft()
-        self.speed = 0.0
-        if len(seen) >= SEEN_LEAST and t - seen[0][0] > SEEN_SPAN_NS // 2:
-            times = np.array([(s[0] - t) * 1e-9 for s in seen])
-            times -= times.mean()
-            speed = float(np.linalg.norm(times @ np.array([s[1] for s in seen]) / (times @ times)))
-            self.speed = speed if speed > SEEN_NOISE else 0.0
+    first = 1 if s.seen == SEEN_KEPT else 0
+    while first < s.seen and t - s.seen_t[first] > SEEN_SPAN_NS:
+        first += 1
+    n = s.seen - first
+    for i in range(n):
+        s.seen_t[i] = s.seen_t[i + first]
+        for k in range(3):
+            s.seen_p[i, k] = s.seen_p[i + first, k]
+    s.seen_t[n] = t
+    for k in range(3):
+        s.seen_p[n, k] = point[k]
+    n += 1
+    s.seen = n
+    s.seen_speed = 0.0
+    if n < SEEN_LEAST or t - s.seen_t[0] <= SEEN_SPAN_NS // 2:
+        return
+    middle = 0.0
+    for i in range(n):
+        middle += (s.seen_t[i] - t) * 1e-9 / n
+    spread = along0 = along1 = along2 = 0.0
+    for i in range(n):
+        since = (s.seen_t[i] - t) * 1e-9 - middle
+        spread += since * since
+        along0 += since * s.seen_p[i, 0]
+        along1 += since * s.seen_p[i, 1]
+        along2 += since * s.seen_p[i, 2]
+    speed = math.sqrt(along0 * along0 + along1 * along1 + along2 * along2) / spread
+    if speed > SEEN_NOISE:
+        s.seen_speed = speed

@@ -57,10 +57,9 @@ class ErrorStateFilter:
 
     def on_imu(self, sample: ImuSample) -> None:
         """Take a sample, in order of arrival."""
-        self._inertial.on_imu(sample)
-        if self._inertial.begun:
-            self._ladder.saw_imu(self._inertial.newest)
-            self._device_q = sample.q if self._inertial.newest == sample.t else self._device_q
+        if self._inertial.on_imu(sample):
+            self._ladder.saw_imu(sample.t)
+            self._device_q = sample.q
 
     def on_fix(self, fix: OpticalFix, now: int) -> Verdict:
         """Take an optical fix that arrives at ``now``, later than its own ``t``."""

@@ -7,65 +7,49 @@ other but not with us start the place anew (foot_filter_optical). The output is 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from foottrack_protocol.messages import Side
 from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings, Placement
-from foottrack_service.fusion.contact import QUIET, STATISTIC, UNREST, SeenMotion, stance_sigma
+from foottrack_service.fusion.contact import QUIET, STATISTIC, UNREST
 from foottrack_service.fusion.foot_filter_candidates import Rejected, fill_reset
 from foottrack_service.fusion.foot_filter_doubt import NOT_OURS, SURE_SIGMA, Doubt
 from foottrack_service.fusion.foot_filter_events import (
     ACCEPTED,
     ARM,
-    COLUMNS,
     FIX,
-    FLOOR,
-    GYRO,
-    IMU,
     KIND,
     MEASURED_Q,
     POINT,
     POINT_COV,
-    QUIET_FLAG,
     TURN_SIGMA,
     ZERO_SIGMA,
 )
 from foottrack_service.fusion.foot_filter_kernel import NE
+from foottrack_service.fusion.foot_filter_memory import DEPTH, MARKER, new_foot
 from foottrack_service.fusion.foot_filter_optical import (
-    CHI_SQUARE_1,
-    CHI_SQUARE_3,
-    OLDEST_S,
+    FAR,
+    IMPOSSIBLE,
+    STALE,
+    TAKEN,
+    UNUSED,
     Blob,
-    FixRows,
     implausible,
-    judged,
+    settle_fix,
+    take_fix,
 )
-from foottrack_service.fusion.foot_filter_output import CONTACT, follow, predicted
-from foottrack_service.fusion.foot_filter_replay import (
-    ANKLE_ARM,
-    FOOT_UP,
-    HOLE_S,
-    attitude_error,
-    replay,
-    smallest_variances,
-)
-from foottrack_service.fusion.foot_filter_sample import SampleRows, first_state, upright, usable
-from foottrack_service.fusion.interface import FIX_MEMORY_S, ImuSample, Kind, OpticalFix, Verdict, Whereabouts
+from foottrack_service.fusion.foot_filter_output import CONTACT, predicted
+from foottrack_service.fusion.foot_filter_replay import attitude_error
+from foottrack_service.fusion.foot_filter_sample import FIRST, JUMPED, LEFT_OUT, first_state, take_sample, upright
+from foottrack_service.fusion.interface import ImuSample, Kind, OpticalFix, Verdict, Whereabouts
 from foottrack_service.fusion.timeline import Timeline
 from foottrack_service.rotations import Array
 
 FEET_APART = {"left": -0.1, "right": 0.1}
 """m: where a foot stands that only an IMU knows (PROTOCOL, results)."""
-QUIET_STATISTIC = 0.25
-"""A foot this quiet shows its gyro's bias."""
-JUMPED_AFTER = 4
-"""So many samples in a row from the past: the device's clock was set back."""
-UNSURE_AFTER_S = 0.25
-"""A hole in the IMU after which the place needs fixes that agree."""
-UNSURE_SIGMA = 0.3
-"""m per axis: likewise."""
 KNOWN_SIGMA = 0.1
 """m per axis: of a foot that may claim a fix."""
 
@@ -74,122 +58,82 @@ class InertialFilter:
     """One foot's IMU and the fixes that correct it. Times in ns (``newest`` is the last sample's), stage vectors."""
 
     def __init__(self, foot: FootSettings, side: Side, *, floor: bool) -> None:
-        self._foot, self._side, self._use_floor = foot, side, floor
-        self._floor = 0.0
-        self._timeline, self._smallest = Timeline(), smallest_variances()
-        self._samples = SampleRows()
-        self._last: Array = np.zeros(COLUMNS)
-        self.newest, self._behind = 0, 0
-        self._memory, self._lock = np.zeros(4), np.zeros(9)
+        self._settings, self._side, self._use_floor = foot, side, floor
+        self._foot = new_foot()
+        self._timeline = Timeline(self._foot)
+        record: Any = self._foot[0]
+        self._last: Array = record["last"]
+        self._stance, self._lock = record["stance"], record["lock"]
+        self._acc, self._gyro, self._q = record["acc"], record["gyro"], record["q"]
+        self._p, self._q_alt, self._cov = record["p"], record["q_alt"], record["cov"]
+        self._head_p, self._head_q = record["head_p"], record["head_q"]
+        self.begun = False
+        """Whether there was a sample."""
         self._imu_yaw: float | None = None
         self._seen_yaw = False
         self._blob = Blob(foot)
-        self._motion = SeenMotion()
         self.doubt = Doubt()
         self.other: Whereabouts = lambda kind, t: None
         """The other foot's ``target``."""
-        self.acquired = False
-        """Whether fixes have said where the foot is, and not too long ago."""
+        self.set_floor(0.0)
         self.place(foot.imu)
 
     def place(self, imu: Placement) -> None:
         """The sensor's place on the shoe."""
-        foot = self._foot
-        p, self._imu_q = np.array(imu.p), rot.normalised(np.array(imu.q))
-        self._geometry = np.zeros(6)
-        self._geometry[ANKLE_ARM : ANKLE_ARM + 3] = rot.unrotate(self._imu_q, -p)
-        self._geometry[FOOT_UP : FOOT_UP + 3] = rot.unrotate(self._imu_q, np.array([0.0, 1.0, 0.0]))
-        self._toe_arm = rot.unrotate(self._imu_q, np.array(foot.toe.p) - p)
-        self._fix_rows = FixRows(foot, p, self._imu_q, self._blob)
+        foot, settings = self._foot, self._settings
+        self._imu_p, self._imu_q = np.array(imu.p), rot.normalised(np.array(imu.q))
+        foot["ankle_arm"] = rot.unrotate(self._imu_q, -self._imu_p)
+        foot["toe_arm"] = rot.unrotate(self._imu_q, np.array(settings.toe.p) - self._imu_p)
+        foot["foot_up"] = rot.unrotate(self._imu_q, np.array([0.0, 1.0, 0.0]))
+        foot["foot_to_sensor"] = rot.conjugate(self._imu_q)
+        foot["marker_arm"] = rot.unrotate(self._imu_q, np.array(settings.marker.p) - self._imu_p)
+        foot["sensor_to_marker"] = rot.multiply(rot.conjugate(np.array(settings.marker.q)), self._imu_q)
+        self._place_blob()
         self.acquired = False
 
     def set_floor(self, height: float) -> None:
         """Floor height in the stage, m."""
         self._floor = height
+        self._foot["floor"] = height + self._settings.ankle_height if self._use_floor else math.nan
 
     def set_imu_yaw(self, yaw: float) -> None:
         """Yaw of the device's own frame in the stage, rad: counts until a tag shows the foot's."""
         self._imu_yaw = yaw
 
-    def on_imu(self, sample: ImuSample) -> None:
-        """Take a sample. Without rate or attitude, or not finite, or from the past, it is left out."""
-        if not usable(sample):
-            return
-        timeline = self._timeline
-        if timeline.n == 0:
-            self._begin(sample)
-            return
-        if sample.t <= self.newest:
-            self._behind += 1
-            if self._behind < JUMPED_AFTER:
-                return
+    def on_imu(self, sample: ImuSample) -> bool:
+        """Take a sample. False: it is left out, without rate or attitude, or not finite, or from the past."""
+        self._acc[:] = sample.acc
+        has_gyro, has_q = sample.gyro is not None, sample.q is not None
+        if has_gyro:
+            self._gyro[:] = sample.gyro
+        if has_q:
+            self._q[:] = sample.q
+        taken = take_sample(self._foot, sample.t, has_gyro, has_q)
+        if taken == JUMPED:
             self._jump_to(sample.t)
-        self._behind = 0
-        dt = (sample.t - self.newest) * 1e-9
-        if dt > UNSURE_AFTER_S:
-            self.acquired = False
-        i = timeline.place(sample.t)
-        if i == 0:
-            return
-        row = timeline.rows[i]
-        self._samples.fill(row, sample, dt)
-        sigma = stance_sigma(timeline.t, timeline.rows, i, dt, timeline.X[i - 1], timeline.P[i - 1], self._memory)
-        if sigma > 0.0:
-            row[ZERO_SIGMA] = math.hypot(sigma, self._motion.speed)
-            row[QUIET_FLAG] = float(self._memory[STATISTIC] < QUIET_STATISTIC and self._motion.speed == 0.0)
-        row[FLOOR] = self._floor + self._foot.ankle_height if self._use_floor else math.nan
-        self._replay(i)
-        follow(self._lock, row, timeline.X[timeline.n - 1], self._toe_arm, min(dt, HOLE_S))
-        self.newest, self._last = sample.t, row.copy()
+            taken = take_sample(self._foot, sample.t, has_gyro, has_q)
+        elif taken == FIRST:
+            self._begin(sample)
+        return bool(taken != LEFT_OUT)
 
     def on_fix(self, fix: OpticalFix) -> Verdict:
         """Take a fix where it belongs."""
         reason = implausible(fix)
         if reason is not None:
             return reason
-        timeline = self._timeline
-        if timeline.n == 0 or fix.t > self.newest + FIX_MEMORY_S * 1e9:
-            return Verdict.UNUSED
-        if fix.t < self.newest - OLDEST_S * 1e9:
-            return Verdict.STALE
-        delay = float(np.clip(timeline.X[timeline.n - 1, 16], -0.05, 0.05))
-        t = fix.t + round(delay * 1e9)
-        i = timeline.place(t)
-        if i == 0:
-            return Verdict.STALE
-        row = timeline.rows[i]
-        row[KIND] = FIX
-        attitudes = self._fix_rows.fill(row, fix, delay)
-        replay(timeline.t, timeline.rows, timeline.X, timeline.P, i, i + 1, self._geometry, self._smallest)
-        x, P = timeline.X[i], timeline.P[i]
-        ours = self._fix_rows.take_attitude(row, fix, attitudes, x)
-        place, turned_by, residual = judged(row, x, P, self._rate(i))
-        if math.sqrt(max(P[0, 0], P[1, 1], P[2, 2])) > UNSURE_SIGMA:
-            self.acquired = False
-        good = ours and place <= CHI_SQUARE_3 and turned_by <= CHI_SQUARE_1
-        point, off = row[POINT : POINT + 3].copy(), np.array(residual)
-        if float(off @ off) > NOT_OURS**2:
-            other = self.other(fix.kind, fix.t)
-            if self.doubt.is_others(t, point, off, self._memory[UNREST], other):
-                self._replay(i)
-                return Verdict.IDENTITY
-        if self.acquired and good:
-            self._accept(i, t, fix.kind)
+        self._p[:], self._cov[:] = fix.p, fix.cov
+        self._head_p[:], self._head_q[:] = fix.head.p, fix.head.q
+        has_q, has_alt = fix.q is not None, fix.q_alt is not None
+        if has_q:
+            self._q[:] = fix.q
+        if has_alt:
+            self._q_alt[:] = fix.q_alt
+        kind = DEPTH if fix.kind == "depth" else MARKER
+        taken = take_fix(self._foot, fix.t, kind, has_q, has_alt)
+        if taken == TAKEN:
+            self._accepted(fix.kind)
             return Verdict.ACCEPTED
-        acquired = self.acquired
-        if ours:
-            turn = None
-            if row[TURN_SIGMA] > 0.0:
-                turn = float(attitude_error(row[MEASURED_Q : MEASURED_Q + 4], x)[1])
-            sigma = math.sqrt(max(row[POINT_COV], row[POINT_COV + 4], row[POINT_COV + 8]))
-            rejected = Rejected(t, point, off, turn, sigma, row[ARM : ARM + 3].copy())
-            known = math.sqrt(max(P[0, 0], P[1, 1], P[2, 2])) if acquired else None
-            agreed = self.doubt.agreed(rejected, fix.kind, known, self._memory[UNREST])
-            if agreed is not None:
-                self._restart_from(agreed, fix)
-                return Verdict.ACCEPTED
-        self._replay(i)
-        return Verdict.GATE if acquired or not ours else Verdict.UNCONFIRMED
+        return Verdict.UNUSED if taken == UNUSED else Verdict.STALE if taken == STALE else self._doubted(fix, taken)
 
     def learn_blob(self, fix: OpticalFix) -> None:
         """A depth blob that is not needed, since the tag is seen, shows where on the shoe blobs lie."""
@@ -197,6 +141,7 @@ class InertialFilter:
             ankle, q, _, sd = self.predicted(fix.t)
             if sd < SURE_SIGMA:
                 self._blob.learn(ankle, q, fix.head.p + rot.rotate(fix.head.q, fix.p))
+                self._place_blob()
 
     def move(self, p: Array, q: Array) -> None:
         """The stage moved, old to new: everything that is kept goes along."""
@@ -215,23 +160,32 @@ class InertialFilter:
         self.doubt.moved(p, q)
         # Fixes of the old stage are in the checkpoints already; none of them may be replayed.
         timeline.restart(int(timeline.t[n - 1]))
-        self._motion.clear()
+        self._forget_motion()
         self._lock[:] = 0.0
 
     def lose(self) -> None:
         """The stage moved and nobody knows how: the place needs fixes that agree."""
         self.acquired, self._seen_yaw = False, False
         self.doubt.forget()
-        self._motion.clear()
+        self._forget_motion()
         if self._timeline.n:
             last = self._timeline.restart(int(self._timeline.t[self._timeline.n - 1]))
             self._timeline.P[last, range(3), range(3)] += 1.0
             self._timeline.P[last, 7, 7] += math.pi**2
 
     @property
-    def begun(self) -> bool:
-        """Whether there was a sample."""
-        return self._timeline.n > 0
+    def acquired(self) -> bool:
+        """Whether fixes have said where the foot is, and not too long ago."""
+        return bool(self._foot["acquired"][0])
+
+    @acquired.setter
+    def acquired(self, value: bool) -> None:
+        self._foot["acquired"] = value
+
+    @property
+    def newest(self) -> int:
+        """Stamp of the last sample, ns."""
+        return int(self._foot["newest"][0])
 
     @property
     def state(self) -> tuple[Array, Array]:
@@ -242,12 +196,12 @@ class InertialFilter:
     @property
     def last_row(self) -> Array:
         """The newest sample as the filter used it (foot_filter_events)."""
-        return self._last
+        return self._last.copy()
 
     @property
     def standing(self) -> bool:
         """Whether the whole foot stands, quietly."""
-        return bool(self._last[ZERO_SIGMA] > 0.0 and self._memory[STATISTIC] < QUIET)
+        return bool(self._last[ZERO_SIGMA] > 0.0 and self._stance[STATISTIC] < QUIET)
 
     @property
     def contact(self) -> bool:
@@ -256,65 +210,75 @@ class InertialFilter:
 
     def predicted(self, t: int) -> tuple[Array, Array, Array, float]:
         """Ankle (m), attitude of the foot, velocity (m/s) and SD of the ankle per axis (m) at ``t``, ns."""
-        timeline = self._timeline
-        i = timeline.n - 1
-        dt = min((t - int(timeline.t[i])) * 1e-9, 1.0)
-        out = predicted(self._last, timeline.X[i], timeline.P[i], self._lock, self._geometry, max(dt, -HOLE_S))
-        q = rot.multiply(out[3:7], rot.conjugate(self._imu_q))
-        return out[0:3], q, out[7:10], math.sqrt(out[10] / 3.0)
+        found = predicted(self._foot, t)
+        return found[0:3], found[3:7], found[7:10], float(found[10])
 
     def target(self, kind: Kind, t: int) -> Array | None:
         """Where in the stage fixes of ``kind`` are expected at ``t``, m; None while that is not well known."""
         if not self.acquired:
             return None
         ankle, q, _, sd = self.predicted(t)
-        point = self._blob.point if kind == "depth" else np.array(self._foot.marker.p)
+        point = self._blob.point if kind == "depth" else np.array(self._settings.marker.p)
         return ankle + rot.rotate(q, point) if sd < KNOWN_SIGMA else None
 
     def _begin(self, sample: ImuSample) -> None:
+        """The first sample has come: the foot stands where it stood."""
         q = upright(sample)
-        if q is None:
-            return
         if self._imu_yaw is not None and sample.q is not None:
             q = rot.multiply(rot.from_yaw(self._imu_yaw), q)
         else:
             q = rot.multiply(rot.from_yaw(-rot.yaw_of(rot.multiply(q, rot.conjugate(self._imu_q)))), q)
-        timeline = self._timeline
-        i = timeline.append(sample.t)
-        self._samples.fill(timeline.rows[i], sample, 0.0)
-        ankle = np.array([FEET_APART[self._side], self._floor + self._foot.ankle_height, 0.0])
-        x, P = first_state(q, ankle - rot.rotate(q, self._geometry[ANKLE_ARM : ANKLE_ARM + 3]), sample)
-        timeline.X[i], timeline.P[i] = x, P
-        self.newest, self._last = sample.t, timeline.rows[i].copy()
+        ankle = np.array([FEET_APART[self._side], self._floor + self._settings.ankle_height, 0.0])
+        x, P = first_state(q, ankle - rot.rotate(q, self._foot["ankle_arm"][0]), sample)
+        self._timeline.X[0], self._timeline.P[0] = x, P
+        self.begun = True
 
-    def _replay(self, start: int) -> None:
-        timeline = self._timeline
-        replay(timeline.t, timeline.rows, timeline.X, timeline.P, start, timeline.n, self._geometry, self._smallest)
+    def _place_blob(self) -> None:
+        self._foot["blob_arm"] = rot.unrotate(self._imu_q, self._blob.point - self._imu_p)
+        self._foot["blob_sigma"] = self._blob.sigma
 
-    def _rate(self, i: int) -> Array:
-        rows = self._timeline.rows
-        j = i + 1 if i + 1 < self._timeline.n else i - 1
-        near = rows[j] if rows[j, KIND] == IMU else self._last
-        rate: Array = near[GYRO : GYRO + 3] - self._timeline.X[i, 13:16]
-        return rate
+    def _forget_motion(self) -> None:
+        self._foot["seen"], self._foot["seen_speed"] = 0, 0.0
 
-    def _accept(self, i: int, t: int, kind: Kind) -> None:
-        timeline = self._timeline
-        row = timeline.rows[i]
-        row[ACCEPTED] = 1.0
-        self._motion.see(t, row[POINT : POINT + 3].copy())
-        self.doubt.accept(t, kind, self._memory[UNREST], self._motion.speed > 0.0)
-        if self._motion.speed > 0.0:
-            sigmas = timeline.rows[i + 1 : timeline.n, ZERO_SIGMA]
-            sigmas[sigmas > 0.0] = np.maximum(sigmas[sigmas > 0.0], self._motion.speed)
-        self._replay(i)
+    def _accepted(self, kind: Kind) -> None:
+        t = int(self._timeline.t[self._foot["fix_at"][0]])
+        self.doubt.accept(t, kind, float(self._stance[UNREST]), bool(self._foot["seen_speed"][0] > 0.0))
+
+    def _doubted(self, fix: OpticalFix, taken: int) -> Verdict:
+        """A fix that is not simply taken: the other foot's, or one that agrees with others that we are wrong."""
+        timeline, i, unrest = self._timeline, int(self._foot["fix_at"][0]), float(self._stance[UNREST])
+        t, row, off = int(timeline.t[i]), timeline.rows[i], self._foot["residual"][0].copy()
+        point, arm = row[POINT : POINT + 3].copy(), row[ARM : ARM + 3].copy()
+        if float(off @ off) > NOT_OURS**2:
+            other = self.other(fix.kind, fix.t)
+            if self.doubt.is_others(t, point, off, unrest, other):
+                settle_fix(self._foot, i, False)
+                return Verdict.IDENTITY
+        if taken == FAR:
+            settle_fix(self._foot, i, True)
+            self._accepted(fix.kind)
+            return Verdict.ACCEPTED
+        acquired = self.acquired
+        if taken != IMPOSSIBLE:
+            turn = None
+            if row[TURN_SIGMA] > 0.0:
+                turn = float(attitude_error(tuple(row[MEASURED_Q : MEASURED_Q + 4].tolist()), timeline.X[i])[1])
+            sigma = math.sqrt(max(row[POINT_COV], row[POINT_COV + 4], row[POINT_COV + 8]))
+            rejected = Rejected(t, point, off, turn, sigma, arm)
+            known = math.sqrt(max(timeline.P[i].diagonal()[:3])) if acquired else None
+            agreed = self.doubt.agreed(rejected, fix.kind, known, unrest)
+            if agreed is not None:
+                self._restart_from(agreed, fix)
+                return Verdict.ACCEPTED
+        settle_fix(self._foot, i, False)
+        return Verdict.GATE if acquired or taken == IMPOSSIBLE else Verdict.UNCONFIRMED
 
     def _restart_from(self, agreed: list[Rejected], fix: OpticalFix) -> None:
         """Begin anew at the oldest of the fixes that agree, and take them all."""
         timeline = self._timeline
-        i = timeline.insert(agreed[0].t - 1)
+        i = timeline.place(agreed[0].t - 1)
         if i == 0:
-            self._replay(1)
+            settle_fix(self._foot, 1, False)
             return
         q = timeline.X[i - 1, 6:10]
         toes = None
@@ -327,19 +291,18 @@ class InertialFilter:
         for j in range(i, timeline.n):
             if timeline.rows[j, KIND] == FIX and int(timeline.t[j]) in chosen:
                 timeline.rows[j, ACCEPTED] = 1.0
-        self._replay(i)
+        settle_fix(self._foot, i, False)
         self.acquired = True
-        self._motion.clear()
+        self._forget_motion()
         self._lock[:] = 0.0
 
     def _jump_to(self, t: int) -> None:
         """The device's clock was set back: go on from there, unsure."""
         self._timeline.restart(t - 1)
-        self.newest = t - 1
+        self._foot["newest"], self._foot["last_q"] = t - 1, 0.0
         self._timeline.P[0, range(3), range(3)] += 0.1**2
         self._timeline.P[0, range(3, 6), range(3, 6)] += 1.0
-        self._memory[:] = 0.0
+        self._stance[:] = 0.0
         self.acquired = False
         self.doubt.clear()
-        self._motion.clear()
-        self._samples.forget()
+        self._forget_motion()

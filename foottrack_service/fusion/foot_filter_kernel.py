@@ -15,17 +15,20 @@ import math
 import numpy as np
 
 from foottrack_service.fusion.compiled import compiled
+from foottrack_service.fusion.compiled_rotations import (
+    Matrix,
+    Vector,
+    quaternion,
+    rotation,
+    turn_body,
+    turn_stage,
+    turned,
+)
 from foottrack_service.rotations import Array
 
 NX = 17
 NE = 16
 GRAVITY = 9.80665
-
-Vector = tuple[float, float, float]
-Matrix = tuple[Vector, Vector, Vector]
-"""Rows. Compiled code keeps tuples in registers; a small array would be allocated each time."""
-Sequence3 = Array | Vector
-Sequence4 = Array | tuple[float, float, float, float]
 
 ACC_NOISE = 0.02
 """m/s^2/sqrt(Hz): a good sensor has 0.002; the rest is vibration and misalignment at rest."""
@@ -45,74 +48,13 @@ GYRO_BIAS_WALK = 0.00002
 """rad/s/sqrt(s)."""
 DELAY_WALK = 0.0001
 """s/sqrt(s)."""
-
-
-@compiled
-def rotation(q: Sequence4) -> Matrix:
-    """The matrix of q, shape (4,), as three rows."""
-    x, y, z, w = q[0], q[1], q[2], q[3]
-    return (
-        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
-        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
-        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
-    )
-
-
-@compiled
-def turned(R: Matrix, v: Sequence3) -> Vector:
-    """R v."""
-    return (
-        R[0][0] * v[0] + R[0][1] * v[1] + R[0][2] * v[2],
-        R[1][0] * v[0] + R[1][1] * v[1] + R[1][2] * v[2],
-        R[2][0] * v[0] + R[2][1] * v[1] + R[2][2] * v[2],
-    )
-
-
-@compiled
-def cross(a: Sequence3, b: Sequence3) -> Vector:
-    """a x b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@compiled
-def product(a: Sequence4, b: Sequence4) -> tuple[float, float, float, float]:
-    """Hamilton product of two quaternions: first b turns, then a."""
-    return (
-        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
-        a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
-        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3],
-        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
-    )
-
-
-@compiled
-def turn_body(q: Array, rx: float, ry: float, rz: float) -> None:
-    """q <- q exp(r), r a rotation vector in the body's frame, in place; the result is unit."""
-    angle = math.sqrt(rx * rx + ry * ry + rz * rz)
-    s = 0.5 - angle * angle / 48.0 if angle < 1e-4 else math.sin(0.5 * angle) / angle
-    c = math.cos(0.5 * angle)
-    bx, by, bz = s * rx, s * ry, s * rz
-    ax, ay, az, aw = q[0], q[1], q[2], q[3]
-    x = aw * bx + ax * c + ay * bz - az * by
-    y = aw * by - ax * bz + ay * c + az * bx
-    z = aw * bz + ax * by - ay * bx + az * c
-    w = aw * c - ax * bx - ay * by - az * bz
-    n = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
-    q[0], q[1], q[2], q[3] = x * n, y * n, z * n, w * n
-
-
-@compiled
-def turn_stage(q: Array, rx: float, ry: float, rz: float) -> None:
-    """q <- exp(r) q, r a rotation vector in the stage, in place; the result is unit."""
-    # exp(r) q is the inverse of (inverse of q) exp(-r).
-    q[0], q[1], q[2] = -q[0], -q[1], -q[2]
-    turn_body(q, -rx, -ry, -rz)
-    q[0], q[1], q[2] = -q[0], -q[1], -q[2]
+SMALLEST, SMALLEST_OF_GYRO_BIAS = 1e-8, 1e-14
+"""Below which no variance falls, in the units of each."""
 
 
 @compiled
 def propagate(
-    x: Array, P: Array, acc: Sequence3, gyro: Sequence3, step: float, clipped: bool, wander: float, dt: float
+    x: Array, P: Array, acc: Vector, gyro: Vector, step: float, clipped: bool, wander: float, dt: float
 ) -> None:
     """Carry x and P forward by dt, s, in place.
 
@@ -123,7 +65,7 @@ def propagate(
     f = (acc[0] - x[10], acc[1] - x[11], acc[2] - x[12])
     wx, wy, wz = gyro[0] - x[13], gyro[1] - x[14], gyro[2] - x[15]
     turn_body(q, 0.5 * dt * wx, 0.5 * dt * wy, 0.5 * dt * wz)
-    R = rotation(q)
+    R = rotation(quaternion(x, 6))
     turn_body(q, 0.5 * dt * wx, 0.5 * dt * wy, 0.5 * dt * wz)
     g = turned(R, f)
     ax, ay, az = g[0], g[1] - GRAVITY, g[2]
@@ -208,7 +150,7 @@ def seen_through(P: Array, H: Array, noise: Array, PH: Array) -> Matrix:
 
 
 @compiled
-def update3(x: Array, P: Array, H: Array, innovation: Sequence3, noise: Array, gate: float) -> float:
+def update3(x: Array, P: Array, H: Array, innovation: Vector, noise: Array, gate: float) -> float:
     """Measurement of three components, H of shape (3, 16), its noise of shape (3, 3), in place.
 
     Returns the squared Mahalanobis distance; nothing is changed when that is above ``gate`` or is not finite.
@@ -259,15 +201,16 @@ def update1(x: Array, P: Array, h: Array, innovation: float, noise: float, gate:
 
 
 @compiled
-def floor_covariance(P: Array, smallest: Array) -> None:
-    """No variance below ``smallest``, shape (16,): rounding and too many agreeing fixes make none certain."""
+def floor_covariance(P: Array) -> None:
+    """No variance below SMALLEST: rounding and too many agreeing fixes make none certain."""
     for i in range(NE):
-        if P[i, i] < smallest[i]:
-            P[i, i] = smallest[i]
+        smallest = SMALLEST_OF_GYRO_BIAS if 12 <= i < 15 else SMALLEST
+        if P[i, i] < smallest:
+            P[i, i] = smallest
 
 
 @compiled
-def _fuse3(x: Array, P: Array, PH: Array, S: Matrix, innovation: Sequence3, gate: float) -> float:
+def _fuse3(x: Array, P: Array, PH: Array, S: Matrix, innovation: Vector, gate: float) -> float:
     found, inverse = invert3(S)
     if not found:
         return math.inf

@@ -9,20 +9,36 @@ import numpy as np
 from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings
 from foottrack_service.fusion.compiled import compiled
+from foottrack_service.fusion.compiled_rotations import Vector, product, quaternion, rotation, squared, turned, vector
+from foottrack_service.fusion.contact import see
+from foottrack_service.fusion.foot_filter_doubt import NOT_OURS
 from foottrack_service.fusion.foot_filter_events import (
+    ACCEPTED,
     ARM,
+    FIX,
+    GYRO,
+    IMU,
+    KIND,
     MEASURED_Q,
     NORMAL,
     PLACED_DELAY,
     POINT,
     POINT_COV,
     TURN_SIGMA,
+    ZERO_SIGMA,
 )
-from foottrack_service.fusion.foot_filter_kernel import NE, Vector, invert3, rotation, seen_through, turned
-from foottrack_service.fusion.foot_filter_replay import attitude_error, point_model
-from foottrack_service.fusion.interface import OpticalFix, Verdict
+from foottrack_service.fusion.foot_filter_kernel import NE, invert3, seen_through
+from foottrack_service.fusion.foot_filter_memory import DEPTH, Feet, Foot
+from foottrack_service.fusion.foot_filter_replay import attitude_error, point_model, replay
+from foottrack_service.fusion.interface import FIX_MEMORY_S, OpticalFix, Verdict
+from foottrack_service.fusion.timeline import place
 from foottrack_service.rotations import Array
 
+UNUSED, STALE, TAKEN, FAR, DOUBTED, IMPOSSIBLE = 0, 1, 2, 3, 4, 5
+"""What became of a fix."""
+LONGEST_DELAY_S = 0.05
+UNSURE_SIGMA = 0.3
+"""m per axis: who knows the place no better needs fixes that agree."""
 CHI_SQUARE_3 = 16.3
 """99.9 % of good fixes are below (3 degrees of freedom)."""
 CHI_SQUARE_1 = 16.3
@@ -52,8 +68,10 @@ BLOB_CORRELATED = 20.0
 def implausible(fix: OpticalFix) -> Verdict | None:
     """Why a fix is not looked at any further; None when it may be good."""
     # A sum is finite only where all its parts are.
-    total = float(fix.p.sum() + fix.cov.sum() + fix.head.p.sum() + fix.head.q.sum())
-    if not math.isfinite(total) or min(fix.cov[0, 0], fix.cov[1, 1], fix.cov[2, 2]) < 0.0:
+    xx, yx, zx, xy, yy, zy, xz, yz, zz = fix.cov.ravel().tolist()
+    total = sum(fix.p.tolist()) + sum(fix.head.p.tolist()) + sum(fix.head.q.tolist())
+    total += xx + yx + zx + xy + yy + zy + xz + yz + zz
+    if not math.isfinite(total) or min(xx, yy, zz) < 0.0:
         return Verdict.INVALID
     if fix.edge_px < LEAST_EDGE_PX:
         return Verdict.BORDER
@@ -83,72 +101,152 @@ class Blob:
             self.point = self.point + offset / (BLOB_CORRELATED + self._n)
 
 
-class FixRows:
-    """Turns fixes into the timeline's rows for one shoe."""
+@compiled
+def take_fix(foot: Feet, t: int, kind: int, has_q: bool, has_alt: bool) -> int:
+    """Take the fix of ``t``, ns, that lies in ``p``, ``q``, ``q_alt``, ``cov``, ``head_p`` and ``head_q``.
 
-    def __init__(self, foot: FootSettings, imu_p: Array, imu_q: Array, blob: Blob) -> None:
-        self._target_to_sensor = rot.multiply(rot.conjugate(imu_q), np.array(foot.marker.q))
-        self._sensor_to_target = rot.conjugate(self._target_to_sensor)
-        self._arm = rot.unrotate(imu_q, np.array(foot.marker.p) - imu_p)
-        self._imu_p, self._imu_q = imu_p, imu_q
-        self._blob = blob
-
-    def fill(self, row: Array, fix: OpticalFix, delay: float) -> list[Array]:
-        """Write place and noise into ``row``; returns the sensor's attitudes that the tag allows, best first."""
-        matrix = np.array(rotation(fix.head.q))
-        row[POINT : POINT + 3] = fix.head.p + matrix @ fix.p
-        distance2 = float(fix.p @ fix.p)
-        noise = HEAD_NOISE**2 + HEAD_TURN_NOISE**2 * distance2
-        row[ARM : ARM + 3] = self._arm
-        if fix.kind == "depth":
-            row[ARM : ARM + 3] = rot.unrotate(self._imu_q, self._blob.point - self._imu_p)
-            noise += self._blob.sigma**2
-        row[POINT_COV : POINT_COV + 9] = (matrix @ fix.cov @ matrix.T + noise * np.eye(3)).ravel()
-        row[PLACED_DELAY] = delay
-        found = []
-        for q in (fix.q, fix.q_alt):
-            norm = 0.0 if q is None else math.sqrt(float(q @ q))
-            if q is not None and math.isfinite(norm) and norm > 0.0:
-                found.append(rot.multiply(rot.multiply(fix.head.q, q / norm), self._sensor_to_target))
-        return found
-
-    def take_attitude(self, row: Array, fix: OpticalFix, attitudes: list[Array], x: Array) -> bool:
-        """Let gravity, as the state ``x`` knows it, choose among the tag's attitudes.
-
-        False: none of them can be this foot's. One that leans a little too much is just not used.
-        """
-        if not attitudes:
-            return True
-        leans = []
-        for q in attitudes:
-            error = attitude_error(q, x)
-            leans.append(math.hypot(error[0], error[2]))
-        best = int(np.argmin(leans))
-        if leans[best] > TILT_IMPOSSIBLE:
-            return False
-        if leans[best] <= TILT_USABLE:
-            q = attitudes[best]
-            row[MEASURED_Q : MEASURED_Q + 4] = q
-            target = np.array(rotation(rot.multiply(q, self._target_to_sensor)))
-            row[NORMAL : NORMAL + 3] = target[:, 2]
-            across = math.sqrt(max(0.0, float(np.linalg.eigvalsh(fix.cov)[0])))
-            row[TURN_SIGMA] = math.hypot(LEAST_TURN_SIGMA, TURN_PER_METRE * across)
-        return True
+    It is the event ``fix_at`` then, off by ``residual``, and waits for ``settle_fix`` where it is not TAKEN.
+    FAR: good, but so far off that it may be the other foot's. DOUBTED: beyond the gates, or of a foot that does not
+    know its place. IMPOSSIBLE: no attitude of the tag can be this foot's.
+    """
+    s = foot[0]
+    if s.n == 0 or t > s.newest + FIX_MEMORY_S * 1e9:
+        return UNUSED
+    if t < s.newest - OLDEST_S * 1e9:
+        return STALE
+    delay = min(max(s.X[s.n - 1, 16], -LONGEST_DELAY_S), LONGEST_DELAY_S)
+    t += round(delay * 1e9)
+    i = place(s, t)
+    if i == 0:
+        return STALE
+    row, x, P = s.rows[i], s.X[i], s.P[i]
+    _fill_fix(s, row, kind, delay)
+    replay(s, i, i + 1)
+    ours = _take_attitude(s, row, x, has_q, has_alt)
+    place_off, turn_off, residual = _judged(row, x, P, _rate(s, i, x))
+    if not (P[0, 0] <= UNSURE_SIGMA**2 and P[1, 1] <= UNSURE_SIGMA**2 and P[2, 2] <= UNSURE_SIGMA**2):
+        s.acquired = 0
+    s.fix_at = i
+    s.residual[0], s.residual[1], s.residual[2] = residual
+    if not ours:
+        return IMPOSSIBLE
+    if s.acquired == 0 or not (place_off <= CHI_SQUARE_3 and turn_off <= CHI_SQUARE_1):
+        return DOUBTED
+    if squared(residual[0]) + squared(residual[1]) + squared(residual[2]) > NOT_OURS**2:
+        return FAR
+    _accept(s, i)
+    replay(s, i, s.n)
+    return TAKEN
 
 
 @compiled
-def judged(row: Array, x: Array, P: Array, rate: Array) -> tuple[float, float, Vector]:
+def settle_fix(foot: Feet, i: int, accepted: bool) -> None:
+    """The fix at event i is accepted or not; all events from there on are replayed."""
+    s = foot[0]
+    if accepted:
+        _accept(s, i)
+    replay(s, i, s.n)
+
+
+@compiled
+def _accept(s: Foot, i: int) -> None:
+    s.rows[i, ACCEPTED] = 1.0
+    see(s, s.t[i], vector(s.rows[i], POINT))
+    if s.seen_speed > 0.0:
+        for j in range(i + 1, s.n):
+            if s.rows[j, ZERO_SIGMA] > 0.0:
+                s.rows[j, ZERO_SIGMA] = max(s.rows[j, ZERO_SIGMA], s.seen_speed)
+
+
+@compiled
+def _fill_fix(s: Foot, row: Array, kind: int, delay: float) -> None:
+    """Place and noise, in the stage."""
+    row[KIND] = FIX
+    R, p = rotation(quaternion(s.head_q, 0)), vector(s.p, 0)
+    cov = (vector(s.cov[0], 0), vector(s.cov[1], 0), vector(s.cov[2], 0))
+    seen = turned(R, p)
+    noise = HEAD_NOISE**2 + HEAD_TURN_NOISE**2 * (p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+    if kind == DEPTH:
+        noise += squared(s.blob_sigma)
+    for k in range(3):
+        row[POINT + k] = s.head_p[k] + seen[k]
+        row[ARM + k] = s.blob_arm[k] if kind == DEPTH else s.marker_arm[k]
+    for j in range(3):
+        # A column of cov R', turned: the column j of R cov R'.
+        column = turned(R, turned(cov, R[j]))
+        for k in range(3):
+            row[POINT_COV + 3 * k + j] = column[k] + (noise if j == k else 0.0)
+    row[PLACED_DELAY] = delay
+
+
+@compiled
+def _take_attitude(s: Foot, row: Array, x: Array, has_q: bool, has_alt: bool) -> bool:
+    """Let gravity, as the state ``x`` knows it, choose among the tag's attitudes.
+
+    False: none of them can be this foot's. One that leans a little too much is just not used.
+    """
+    to_marker = quaternion(s.sensor_to_marker, 0)
+    best, least = (0.0, 0.0, 0.0, 1.0), math.inf
+    for second in (False, True):
+        q = quaternion(s.q_alt, 0) if second else quaternion(s.q, 0)
+        n = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+        if (has_alt if second else has_q) and 0.0 < n < math.inf:
+            seen = product(quaternion(s.head_q, 0), (q[0] / n, q[1] / n, q[2] / n, q[3] / n))
+            error = attitude_error(product(seen, to_marker), x)
+            lean = math.sqrt(error[0] * error[0] + error[2] * error[2])
+            if lean < least:
+                best, least = seen, lean
+    if least == math.inf:
+        return True
+    if least > TILT_IMPOSSIBLE:
+        return False
+    if least <= TILT_USABLE:
+        q = product(best, to_marker)
+        R = rotation(best)
+        for k in range(4):
+            row[MEASURED_Q + k] = q[k]
+        for k in range(3):
+            row[NORMAL + k] = R[k][2]
+        across2 = TURN_PER_METRE * TURN_PER_METRE * max(0.0, _smallest(s.cov[:]))
+        row[TURN_SIGMA] = math.sqrt(LEAST_TURN_SIGMA * LEAST_TURN_SIGMA + across2)
+    return True
+
+
+@compiled
+def _smallest(S: Array) -> float:
+    """The smallest eigenvalue of a symmetric matrix, shape (3, 3) (O. Smith, Eigenvalues of a symmetric 3x3, 1961)."""
+    mean: float = (S[0, 0] + S[1, 1] + S[2, 2]) / 3.0
+    a, b, c, d, e, f = S[0, 0] - mean, S[1, 0], S[2, 0], S[1, 1] - mean, S[2, 1], S[2, 2] - mean
+    p = math.sqrt((a * a + d * d + f * f + 2.0 * (b * b + c * c + e * e)) / 6.0)
+    if p == 0.0:
+        return mean
+    half_det = 0.5 * (a * (d * f - e * e) - b * (b * f - e * c) + c * (b * e - d * c)) / (p * p * p)
+    angle = (math.acos(min(max(half_det, -1.0), 1.0)) + math.tau) / 3.0
+    return mean + 2.0 * p * math.cos(angle)
+
+
+@compiled
+def _rate(s: Foot, i: int, x: Array) -> Vector:
+    """The turning at event i, rad/s, of the sample behind it, or before the newest event."""
+    j = i + 1 if i + 1 < s.n else i - 1
+    if s.rows[j, KIND] == IMU:
+        return s.rows[j, GYRO] - x[13], s.rows[j, GYRO + 1] - x[14], s.rows[j, GYRO + 2] - x[15]
+    return s.last[GYRO] - x[13], s.last[GYRO + 1] - x[14], s.last[GYRO + 2] - x[15]
+
+
+@compiled
+def _judged(row: Array, x: Array, P: Array, rate: Vector) -> tuple[float, float, Vector]:
     """A fix against the state at its instant: squared Mahalanobis distances of place and of turn, residual (m)."""
     h, H, PH = np.empty(3), np.empty((3, NE)), np.empty((3, NE))
-    point_model(x, row[ARM : ARM + 3], rate, x[16] - row[PLACED_DELAY], h, H)
+    point_model(x, vector(row, ARM), rate, x[16] - row[PLACED_DELAY], h, H)
     found, inverse = invert3(seen_through(P, H, row[POINT_COV : POINT_COV + 9].reshape(3, 3), PH))
     residual = (row[POINT] - h[0], row[POINT + 1] - h[1], row[POINT + 2] - h[2])
     y = turned(inverse, residual)
     place = residual[0] * y[0] + residual[1] * y[1] + residual[2] * y[2] if found else np.inf
     turn = 0.0
     if row[TURN_SIGMA] > 0.0:
-        error = attitude_error(row[MEASURED_Q : MEASURED_Q + 4], x)
-        variance, across = row[TURN_SIGMA] ** 2, 0.0
+        error = attitude_error(quaternion(row, MEASURED_Q), x)
+        variance, across = squared(row[TURN_SIGMA]), 0.0
         for i in range(3):
             across += row[NORMAL + i] * error[i]
             for j in range(3):

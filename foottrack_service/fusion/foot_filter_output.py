@@ -11,11 +11,23 @@ import math
 import numpy as np
 
 from foottrack_service.fusion.compiled import compiled
+from foottrack_service.fusion.compiled_rotations import (
+    cross,
+    product,
+    quaternion,
+    rotation,
+    squared,
+    turn_body,
+    turned,
+    vector,
+)
 from foottrack_service.fusion.foot_filter_events import ACC, CLIPPED, GYRO, ZERO_SIGMA
-from foottrack_service.fusion.foot_filter_kernel import GRAVITY, cross, rotation, turn_body, turned
-from foottrack_service.fusion.foot_filter_replay import ANKLE_ARM
+from foottrack_service.fusion.foot_filter_kernel import GRAVITY
+from foottrack_service.fusion.foot_filter_memory import Feet, Foot
+from foottrack_service.fusion.foot_filter_replay import HOLE_S
 from foottrack_service.rotations import Array
 
+LONGEST_PREDICTION_S = 1.0
 LONGEST_HOLD_S = 0.02
 """The last sample's acceleration and turning hold for so long; after that the foot coasts at its speed."""
 COASTING_DECAY_S = 0.15
@@ -38,17 +50,18 @@ RELEASE_S = 0.017
 
 
 @compiled
-def follow(lock: Array, row: Array, x: Array, toe_arm: Array, dt: float) -> None:
-    """Carry the stance lock over one sample, dt in s. ``lock[OFFSET]`` is what the output is moved by."""
-    R = rotation(x[6:10])
+def follow(s: Foot, dt: float) -> None:
+    """Carry the stance lock over the newest sample, dt in s. ``lock[OFFSET]`` is what the output is moved by."""
+    lock, row, x, toe_arm = s.lock[:], s.last[:], s.X[s.n - 1], vector(s.toe_arm, 0)
+    R = rotation(quaternion(x, 6))
     arm = turned(R, toe_arm)
     speed = turned(R, cross((row[GYRO] - x[13], row[GYRO + 1] - x[14], row[GYRO + 2] - x[15]), toe_arm))
     toe = (x[0] + arm[0], x[1] + arm[1], x[2] + arm[2])
     s2 = 0.0
     gap2 = 0.0
     for k in range(3):
-        s2 += (x[3 + k] + speed[k]) ** 2
-        gap2 += (toe[k] - lock[HELD + k]) ** 2
+        s2 += squared(x[3 + k] + speed[k])
+        gap2 += squared(toe[k] - lock[HELD + k])
     pivots = lock[LOCKED] == 1.0 and s2 < TOE_SPEED**2 and toe[1] - lock[HELD + 1] < TOE_RISE
     stands = row[ZERO_SIGMA] > 0.0 or pivots
     lock[CONTACT] = 1.0 if stands else 0.0
@@ -72,27 +85,29 @@ def follow(lock: Array, row: Array, x: Array, toe_arm: Array, dt: float) -> None
 
 
 @compiled
-def predicted(row: Array, x: Array, P: Array, lock: Array, geometry: Array, dt: float) -> Array:
-    """The foot dt s after the newest event.
+def predicted(foot: Feet, t: int) -> Array:
+    """The foot at ``t``, ns.
 
-    Shape (11,): ankle (3, m), sensor's attitude (4), ankle's velocity (3, m/s), variance of the ankle summed over the
-    three axes (m^2). ``row`` is the newest IMU sample.
+    Shape (11,): ankle (3, m), the foot's attitude (4), ankle's velocity (3, m/s), SD of the ankle per axis (m).
     """
+    s = foot[0]
+    i = s.n - 1
+    row, x, P, lock, arm = s.last[:], s.X[i], s.P[i], s.lock[:], vector(s.ankle_arm, 0)
+    dt = max(min((t - s.t[i]) * 1e-9, LONGEST_PREDICTION_S), -HOLE_S)
     out = np.empty(11)
     q = x[6:10].copy()
     hold = min(max(dt, -LONGEST_HOLD_S), LONGEST_HOLD_S)
     clipped = row[CLIPPED] == 1.0
     w = (row[GYRO] - x[13], row[GYRO + 1] - x[14], row[GYRO + 2] - x[15])
     turn_body(q, 0.5 * hold * w[0], 0.5 * hold * w[1], 0.5 * hold * w[2])
-    g = turned(rotation(q), (row[ACC] - x[10], row[ACC + 1] - x[11], row[ACC + 2] - x[12]))
+    g = turned(rotation(quaternion(q, 0)), (row[ACC] - x[10], row[ACC + 1] - x[11], row[ACC + 2] - x[12]))
     a = (0.0, 0.0, 0.0) if clipped else (g[0], g[1] - GRAVITY, g[2])
     turn_body(q, 0.5 * hold * w[0], 0.5 * hold * w[1], 0.5 * hold * w[2])
-    R = rotation(q)
-    arm = geometry[ANKLE_ARM : ANKLE_ARM + 3]
+    R = rotation(quaternion(q, 0))
     r = turned(R, arm)
     coast = dt - hold
     slow = math.exp(-max(coast, 0.0) / COASTING_DECAY_S)
-    s = turned(R, cross(w, arm))
+    spin = turned(R, cross(w, arm))
     free = 0.5 * COASTING_ACCELERATION * coast * coast if coast > 0.0 else 0.0
     still = lock[CONTACT] == 1.0
     total = 3.0 * free * free * (0.01 if still else 1.0)
@@ -101,9 +116,10 @@ def predicted(row: Array, x: Array, P: Array, lock: Array, geometry: Array, dt: 
         v = x[3 + k] + a[k] * hold
         out[k] = x[k] + x[3 + k] * hold + 0.5 * a[k] * hold * hold + r[k] + lock[OFFSET + k]
         out[k] += v * (COASTING_DECAY_S * (1.0 - slow) if coast > 0.0 else coast)
-        out[3 + k] = q[k]
-        out[7 + k] = (v + s[k]) * slow
+        out[7 + k] = (v + spin[k]) * slow
         total += P[k, k] + 2.0 * dt * P[k, 3 + k] + dt * dt * P[3 + k, 3 + k] + lever * P[6 + k, 6 + k]
-    out[6] = q[3]
-    out[10] = max(total, 0.0)
+    foot_q = product(quaternion(q, 0), quaternion(s.foot_to_sensor, 0))
+    for k in range(4):
+        out[3 + k] = foot_q[k]
+    out[10] = math.sqrt(max(total, 0.0) / 3.0)
     return out

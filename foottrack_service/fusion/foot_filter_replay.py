@@ -10,6 +10,20 @@ import math
 import numpy as np
 
 from foottrack_service.fusion.compiled import compiled
+from foottrack_service.fusion.compiled_rotations import (
+    Quaternion,
+    Vector,
+    conjugate,
+    cross,
+    logarithm,
+    product,
+    quaternion,
+    rotation,
+    squared,
+    turn_stage,
+    turned,
+    vector,
+)
 from foottrack_service.fusion.foot_filter_events import (
     ACC,
     ACCEPTED,
@@ -41,23 +55,15 @@ from foottrack_service.fusion.foot_filter_events import (
 from foottrack_service.fusion.foot_filter_kernel import (
     GRAVITY,
     NE,
-    Sequence3,
-    Sequence4,
-    Vector,
-    cross,
+    NX,
     floor_covariance,
     propagate,
-    rotation,
-    turn_stage,
-    turned,
     update1,
     update3,
     update_speed,
 )
+from foottrack_service.fusion.foot_filter_memory import Foot
 from foottrack_service.rotations import Array
-
-# geometry, shape (6,), sensor frame
-ANKLE_ARM, FOOT_UP = 0, 3
 
 HOLE_S = 0.1
 """A longer silence of the IMU is not integrated across."""
@@ -87,37 +93,36 @@ LEVEL_BELOW = 0.05
 """rad: who knows the tilt better than this does not ask the specific force."""
 
 
-def smallest_variances() -> Array:
-    """Below which no variance falls, shape (16,): of p, v, attitude, both biases, the time offset."""
-    return np.array([1e-8] * 3 + [1e-8] * 3 + [1e-8] * 3 + [1e-8] * 3 + [1e-14] * 3 + [1e-8])
-
-
 @compiled
-def replay(t: Stamps, rows: Array, X: Array, P: Array, start: int, end: int, geometry: Array, smallest: Array) -> None:
+def replay(s: Foot, start: int, end: int) -> None:
     """States and covariances after the events ``start`` .. ``end`` - 1 from the one before. ``start`` is at least 1."""
+    t, rows = s.t[:], s.rows[:]
     for i in range(start, end):
-        X[i] = X[i - 1]
-        P[i] = P[i - 1]
+        x, P, row = s.X[i], s.P[i], rows[i]
+        for j in range(NX):
+            x[j] = s.X[i - 1, j]
+        for j in range(NE):
+            for k in range(NE):
+                P[j, k] = s.P[i - 1, j, k]
         dt = (t[i] - t[i - 1]) * 1e-9
         if dt > 0.0:
-            _advance(t, rows, X[i], P[i], i, end, dt)
-        kind = rows[i, KIND]
-        if kind == IMU:
-            _inertial_updates(rows[i], X[i], P[i], min(dt, HOLE_S), geometry)
-        elif kind == RESET:
-            _reset(rows[i], X[i], P[i])
-        elif rows[i, ACCEPTED] == 1.0:
-            fix_updates(rows[i], X[i], P[i], _rate(rows, X[i], i, end))
-        floor_covariance(P[i], smallest)
+            _advance(t, rows, x, P, i, end, dt)
+        if row[KIND] == IMU:
+            _inertial_updates(s, row, x, P, min(dt, HOLE_S))
+        elif row[KIND] == RESET:
+            _reset(row, x, P)
+        elif row[ACCEPTED] == 1.0:
+            fix_updates(row, x, P, _rate(rows, x, i, end))
+        floor_covariance(P)
 
 
 @compiled
-def point_model(x: Array, arm: Array, rate: Sequence3, delay: float, h: Array, H: Array) -> None:
+def point_model(x: Array, arm: Vector, rate: Vector, delay: float, h: Array, H: Array) -> None:
     """A point of the foot at ``arm``, sensor frame, m: its place into h (3,), the Jacobian into H (3, 16).
 
     ``rate`` is the sensor's turning, rad/s; ``delay`` how much later than the state the point was seen, s.
     """
-    R = rotation(x[6:10])
+    R = rotation(quaternion(x, 6))
     r = turned(R, arm)
     s = turned(R, cross(rate, arm))
     H[:] = 0.0
@@ -133,35 +138,26 @@ def point_model(x: Array, arm: Array, rate: Sequence3, delay: float, h: Array, H
 
 
 @compiled
-def attitude_error(q: Sequence4, x: Array) -> Vector:
+def attitude_error(q: Quaternion, x: Array) -> Vector:
     """The small turn in the stage from the state's attitude to q, rotation vector, rad."""
-    a, b = q, x[6:10]
-    ex = -a[3] * b[0] + a[0] * b[3] - a[1] * b[2] + a[2] * b[1]
-    ey = -a[3] * b[1] + a[0] * b[2] + a[1] * b[3] - a[2] * b[0]
-    ez = -a[3] * b[2] - a[0] * b[1] + a[1] * b[0] + a[2] * b[3]
-    ew = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    if ew < 0.0:
-        ex, ey, ez, ew = -ex, -ey, -ez, -ew
-    sine = math.sqrt(ex * ex + ey * ey + ez * ez)
-    scale = 2.0 if sine < 1e-9 else 2.0 * math.atan2(sine, ew) / sine
-    return scale * ex, scale * ey, scale * ez
+    return logarithm(product(q, conjugate(quaternion(x, 6))))
 
 
 @compiled
 def fix_updates(row: Array, x: Array, P: Array, rate: Vector) -> None:
     """An accepted fix: the target's place and, where it has one, its turn about the target's face."""
     h, H = np.empty(3), np.empty((3, NE))
-    point_model(x, row[ARM : ARM + 3], rate, x[16] - row[PLACED_DELAY], h, H)
+    point_model(x, vector(row, ARM), rate, x[16] - row[PLACED_DELAY], h, H)
     noise = row[POINT_COV : POINT_COV + 9].reshape(3, 3)
-    update3(x, P, H, row[POINT : POINT + 3] - h, noise, np.inf)
+    update3(x, P, H, (row[POINT] - h[0], row[POINT + 1] - h[1], row[POINT + 2] - h[2]), noise, np.inf)
     if row[TURN_SIGMA] > 0.0:
-        error = attitude_error(row[MEASURED_Q : MEASURED_Q + 4], x)
+        error = attitude_error(quaternion(row, MEASURED_Q), x)
         H1 = np.zeros(NE)
         innovation = 0.0
         for i in range(3):
             H1[6 + i] = row[NORMAL + i]
             innovation += row[NORMAL + i] * error[i]
-        update1(x, P, H1, innovation, row[TURN_SIGMA] ** 2, np.inf)
+        update1(x, P, H1, innovation, squared(row[TURN_SIGMA]), np.inf)
 
 
 @compiled
@@ -197,11 +193,11 @@ def _advance(t: Stamps, rows: Array, x: Array, P: Array, i: int, end: int, dt: f
     if before < 0:
         return
     held = after if rows[after, MEAN_RATE] == 1.0 else before
-    acc = _middle(rows[before, ACC : ACC + 3], rows[after, ACC : ACC + 3])
-    gyro = _middle(rows[held, GYRO : GYRO + 3], rows[after, GYRO : GYRO + 3])
+    acc = _middle(vector(rows[before], ACC), vector(rows[after], ACC))
+    gyro = _middle(vector(rows[held], GYRO), vector(rows[after], GYRO))
     step = 0.0
     for k in range(3):
-        step += (rows[after, ACC + k] - rows[before, ACC + k]) ** 2
+        step += squared(rows[after, ACC + k] - rows[before, ACC + k])
     fused = rows[after, MEAN_RATE] == 1.0
     if (t[after] - t[before]) * 1e-9 <= HOLE_S and dt <= HOLE_S:
         clipped = rows[before, CLIPPED] == 1.0 or rows[after, CLIPPED] == 1.0
@@ -211,7 +207,7 @@ def _advance(t: Stamps, rows: Array, x: Array, P: Array, i: int, end: int, dt: f
 
 
 @compiled
-def _middle(a: Array, b: Array) -> Vector:
+def _middle(a: Vector, b: Vector) -> Vector:
     return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
 
 
@@ -219,7 +215,7 @@ def _middle(a: Array, b: Array) -> Vector:
 def _coast(x: Array, P: Array, gyro: Vector, fused: bool, dt: float) -> None:
     """Across a hole: the speed fades and wanders; a device with an attitude of its own still tells the turn."""
     if fused:
-        turn = turned(rotation(x[6:10]), gyro)
+        turn = turned(rotation(quaternion(x, 6)), gyro)
         turn_stage(x[6:10], turn[0] * dt, turn[1] * dt, turn[2] * dt)
     fade = math.exp(-dt / HOLE_FADE_S)
     reach = HOLE_FADE_S * (1.0 - fade)
@@ -241,7 +237,7 @@ def _coast(x: Array, P: Array, gyro: Vector, fused: bool, dt: float) -> None:
 
 
 @compiled
-def _inertial_updates(row: Array, x: Array, P: Array, dt: float, geometry: Array) -> None:
+def _inertial_updates(s: Foot, row: Array, x: Array, P: Array, dt: float) -> None:
     """What a sample says beyond its motion: zero velocity, the floor, the gyro's bias, up."""
     if dt <= 0.0:
         return
@@ -250,13 +246,13 @@ def _inertial_updates(row: Array, x: Array, P: Array, dt: float, geometry: Array
     if sigma > 0.0:
         held = update_speed(x, P, sigma * sigma * 0.01 / dt, ZERO_GATE) <= ZERO_GATE
         if held and row[FLOOR] == row[FLOOR]:
-            R = rotation(x[6:10])
-            up = turned(R, geometry[FOOT_UP : FOOT_UP + 3])
+            R = rotation(quaternion(x, 6))
+            up = turned(R, vector(s.foot_up, 0))
             if up[1] > FLOOR_LEAN:
-                r = turned(R, geometry[ANKLE_ARM : ANKLE_ARM + 3])
+                r = turned(R, vector(s.ankle_arm, 0))
                 h[:] = 0.0
                 h[1], h[6], h[8] = 1.0, -r[2], r[0]
-                noise = (FLOOR_SIGMA + sigma) ** 2 * 0.1 / dt
+                noise = squared(FLOOR_SIGMA + sigma) * 0.1 / dt
                 update1(x, P, h, row[FLOOR] - x[1] - r[1], noise, FLOOR_GATE)
         if row[QUIET_FLAG] == 1.0 and row[MEAN_RATE] == 0.0:
             for k in range(3):
@@ -267,17 +263,17 @@ def _inertial_updates(row: Array, x: Array, P: Array, dt: float, geometry: Array
             up = (row[ACC] / GRAVITY, row[ACC + 1] / GRAVITY, row[ACC + 2] / GRAVITY)
             _level(up, LEVEL_SIGMA**2 * 0.1 / dt, x, P)
     if row[UP] != 0.0 or row[UP + 1] != 0.0 or row[UP + 2] != 0.0:
-        _level((row[UP], row[UP + 1], row[UP + 2]), UP_SIGMA**2 * UP_CORRELATED_S / dt, x, P)
+        _level(vector(row, UP), UP_SIGMA**2 * UP_CORRELATED_S / dt, x, P)
 
 
 @compiled
 def _level(up: Vector, variance: float, x: Array, P: Array) -> None:
     """``up``, sensor frame, is the stage's up: two components of the attitude error, never the yaw."""
     h = np.zeros(NE)
-    seen = turned(rotation(x[6:10]), up)
+    seen = turned(rotation(quaternion(x, 6)), up)
     h[6] = 1.0
     update1(x, P, h, -seen[2], variance, np.inf)
-    seen = turned(rotation(x[6:10]), up)
+    seen = turned(rotation(quaternion(x, 6)), up)
     h[6], h[8] = 0.0, 1.0
     update1(x, P, h, seen[0], variance, np.inf)
 
@@ -287,11 +283,11 @@ def _reset(row: Array, x: Array, P: Array) -> None:
     """A new start of place, speed and yaw; tilt and biases stay."""
     if row[TURN_SIGMA] > 0.0:
         # The twist about up of the turn from the state's attitude to the measured one.
-        a, b = row[MEASURED_Q : MEASURED_Q + 4], x[6:10]
+        a, b = quaternion(row, MEASURED_Q), quaternion(x, 6)
         y = -a[3] * b[1] + a[0] * b[2] + a[1] * b[3] - a[2] * b[0]
         w = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
         turn_stage(x[6:10], 0.0, 2.0 * math.atan2(y, w), 0.0)
-    r = turned(rotation(x[6:10]), row[ARM : ARM + 3])
+    r = turned(rotation(quaternion(x, 6)), vector(row, ARM))
     for k in range(3):
         x[k] = row[POINT + k] - r[k]
         x[3 + k] = row[SPEED + k]
@@ -299,11 +295,11 @@ def _reset(row: Array, x: Array, P: Array) -> None:
         for j in range(NE):
             P[k, j] = 0.0
             P[j, k] = 0.0
-        P[k, k] = row[POINT_SIGMA] ** 2 if k < 3 else row[SPEED_SIGMA] ** 2
+        P[k, k] = squared(row[POINT_SIGMA]) if k < 3 else squared(row[SPEED_SIGMA])
     if row[YAW_SIGMA] > 0.0:
         for j in range(NE):
             P[7, j] = 0.0
             P[j, 7] = 0.0
-        P[7, 7] = row[YAW_SIGMA] ** 2
-    P[6, 6] += row[TILT_SIGMA] ** 2
-    P[8, 8] += row[TILT_SIGMA] ** 2
+        P[7, 7] = squared(row[YAW_SIGMA])
+    P[6, 6] += squared(row[TILT_SIGMA])
+    P[8, 8] += squared(row[TILT_SIGMA])

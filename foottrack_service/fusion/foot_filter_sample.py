@@ -7,11 +7,39 @@ import math
 import numpy as np
 
 from foottrack_service import rotations as rot
-from foottrack_service.fusion.foot_filter_events import ACC, CLIPPED, GYRO, IMU, KIND, MEAN_RATE, UP, WANDER
+from foottrack_service.fusion.compiled import compiled
+from foottrack_service.fusion.compiled_rotations import conjugate, logarithm, product, quaternion, rotation, squared
+from foottrack_service.fusion.contact import STATISTIC, stance_sigma
+from foottrack_service.fusion.foot_filter_events import (
+    ACC,
+    CLIPPED,
+    COLUMNS,
+    FLOOR,
+    GYRO,
+    IMU,
+    KIND,
+    MEAN_RATE,
+    QUIET_FLAG,
+    UP,
+    WANDER,
+    ZERO_SIGMA,
+)
 from foottrack_service.fusion.foot_filter_kernel import GRAVITY, NE, NX
+from foottrack_service.fusion.foot_filter_memory import Feet, Foot
+from foottrack_service.fusion.foot_filter_output import follow
+from foottrack_service.fusion.foot_filter_replay import HOLE_S, replay
 from foottrack_service.fusion.interface import ImuSample
+from foottrack_service.fusion.timeline import place
 from foottrack_service.rotations import Array
 
+LEFT_OUT, TAKEN, FIRST, JUMPED = 0, 1, 2, 3
+"""What became of a sample."""
+JUMPED_AFTER = 4
+"""So many samples in a row from the past: the device's clock was set back."""
+UNSURE_AFTER_S = 0.25
+"""A hole in the IMU after which the place needs fixes that agree."""
+QUIET_STATISTIC = 0.25
+"""A foot this quiet shows its gyro's bias."""
 MOST_RATE = 40.0
 """rad/s: increments of a device's q that are faster are its own corrections, not the foot."""
 FULL_SCALES = (39.2266, 78.4532, 156.9064)
@@ -32,25 +60,52 @@ centimetres in a swing."""
 _UP = np.array([0.0, 1.0, 0.0])
 
 
-def usable(sample: ImuSample) -> bool:
-    """Whether all numbers are finite and there is a rate or an attitude."""
-    if sample.gyro is None and sample.q is None:
-        return False
-    # A sum of squares is finite only where all its parts are.
-    total = float(sample.acc @ sample.acc)
-    if sample.gyro is not None:
-        total += float(sample.gyro @ sample.gyro)
-    size = 1.0 if sample.q is None else float(sample.q @ sample.q)
-    return math.isfinite(total + size) and size > 0.0
+@compiled
+def take_sample(foot: Feet, t: int, has_gyro: bool, has_q: bool) -> int:
+    """Take the sample of ``t``, ns, that lies in ``acc``, ``gyro`` and ``q``.
+
+    LEFT_OUT: without rate or attitude, or not finite, or from the past. JUMPED: nor is it taken, but so many came from
+    the past that the device's clock was set back. FIRST: it begins the timeline, without a state yet.
+    """
+    s = foot[0]
+    if not _usable(s, has_gyro, has_q):
+        return LEFT_OUT
+    if s.n > 0 and t <= s.newest:
+        s.behind += 1
+        return LEFT_OUT if s.behind < JUMPED_AFTER else JUMPED
+    if s.n == 0 and not has_q and squared(s.acc[0]) + squared(s.acc[1]) + squared(s.acc[2]) < LEAST_FORCE**2:
+        return LEFT_OUT
+    s.behind = 0
+    first = s.n == 0
+    dt = 0.0 if first else (t - s.newest) * 1e-9
+    if dt > UNSURE_AFTER_S:
+        s.acquired = 0
+    i = place(s, t)
+    if i == 0 and not first:
+        return LEFT_OUT
+    row = s.rows[i]
+    _fill_sample(s, row, has_gyro, has_q, dt)
+    s.newest = t
+    if not first:
+        sigma = stance_sigma(s.t[:], s.rows[:], i, dt, s.X[i - 1], s.P[i - 1], s.stance[:])
+        if sigma > 0.0:
+            row[ZERO_SIGMA] = math.sqrt(sigma * sigma + s.seen_speed * s.seen_speed)
+            row[QUIET_FLAG] = 1.0 if s.stance[STATISTIC] < QUIET_STATISTIC and s.seen_speed == 0.0 else 0.0
+        row[FLOOR] = s.floor
+        replay(s, i, s.n)
+    for k in range(COLUMNS):
+        s.last[k] = row[k]
+    if first:
+        return FIRST
+    follow(s, min(dt, HOLE_S))
+    return TAKEN
 
 
-def upright(sample: ImuSample) -> Array | None:
-    """Sensor to a frame with +Y up: the device's own attitude, else what the specific force says; None in free fall."""
+def upright(sample: ImuSample) -> Array:
+    """Sensor to a frame with +Y up: the device's own attitude, else what the specific force says."""
     if sample.q is not None:
         return rot.normalised(sample.q)
     norm = float(np.linalg.norm(sample.acc))
-    if norm < LEAST_FORCE:
-        return None
     axis = np.cross(sample.acc / norm, _UP)
     sine = float(np.linalg.norm(axis))
     angle = math.atan2(sine, float(sample.acc[1]) / norm)
@@ -67,41 +122,55 @@ def first_state(q: Array, p: Array, sample: ImuSample) -> tuple[Array, Array]:
     return x, P
 
 
-class SampleRows:
-    """Turns samples into rows, in order."""
+@compiled
+def _usable(s: Foot, has_gyro: bool, has_q: bool) -> bool:
+    """Whether all numbers are finite and there is a rate or an attitude."""
+    # A sum of squares is finite only where all its parts are.
+    total, size = 0.0, 0.0
+    for k in range(3):
+        total += s.acc[k] * s.acc[k]
+        if has_gyro:
+            total += s.gyro[k] * s.gyro[k]
+    for k in range(4):
+        size += s.q[k] * s.q[k]
+    if has_q:
+        return math.isfinite(total + size) and size > 0.0
+    return has_gyro and math.isfinite(total)
 
-    def __init__(self) -> None:
-        self._q: Array | None = None
-        self._effort = 0.0
-        self._acc: tuple[Array, Array] = (np.zeros(3), np.ones(3))
 
-    def forget(self) -> None:
-        """The next sample does not follow the last one."""
-        self._q = None
-
-    def fill(self, row: Array, sample: ImuSample, dt: float) -> None:
-        """Write a sample that comes ``dt`` s after the last one into ``row``."""
-        row[KIND] = IMU
-        row[ACC : ACC + 3] = sample.acc
-        size = np.abs(sample.acc)
-        last, before = self._acc
-        stuck = bool(np.any((size > STUCK_ABOVE) & (sample.acc == last) & (sample.acc == before)))
-        largest = float(size.max())
-        row[CLIPPED] = float(stuck or any(0.985 < largest / scale < 1.02 for scale in FULL_SCALES))
-        self._acc = (sample.acc, last)
-        q = None if sample.q is None else rot.normalised(sample.q)
-        if q is not None:
-            row[UP : UP + 3] = rot.unrotate(q, _UP)
-        if sample.gyro is not None:
-            row[GYRO : GYRO + 3] = sample.gyro
-        else:
-            row[MEAN_RATE] = 1.0
-            if q is not None:
-                felt = float(np.linalg.norm(sample.acc - GRAVITY * row[UP : UP + 3]))
-                self._effort = max(self._effort * math.exp(-dt / EFFORT_MEMORY_S), min(1.0, felt / FULL_EFFORT))
-                row[WANDER] = DEVICE_TILT * self._effort
-            if q is not None and self._q is not None and dt > 0.0:
-                rate = rot.to_rotation_vector(rot.multiply(rot.conjugate(self._q), q)) / dt
-                if float(rate @ rate) < MOST_RATE**2:
-                    row[GYRO : GYRO + 3] = rate
-        self._q = q
+@compiled
+def _fill_sample(s: Foot, row: Array, has_gyro: bool, has_q: bool, dt: float) -> None:
+    """Write the sample, which comes ``dt`` s after the last one, into ``row``."""
+    row[KIND] = IMU
+    largest, stuck = 0.0, False
+    for k in range(3):
+        force = s.acc[k]
+        row[ACC + k] = force
+        largest = max(largest, abs(force))
+        stuck |= abs(force) > STUCK_ABOVE and force == s.forces[0, k] and force == s.forces[1, k]
+        s.forces[1, k] = s.forces[0, k]
+        s.forces[0, k] = force
+    for scale in FULL_SCALES:
+        stuck |= 0.985 < largest / scale < 1.02
+    row[CLIPPED] = 1.0 if stuck else 0.0
+    q = (0.0, 0.0, 0.0, 0.0)
+    if has_q:
+        n = math.sqrt(squared(s.q[0]) + squared(s.q[1]) + squared(s.q[2]) + squared(s.q[3]))
+        q = (s.q[0] / n, s.q[1] / n, s.q[2] / n, s.q[3] / n)
+        row[UP], row[UP + 1], row[UP + 2] = rotation(q)[1]
+    if has_gyro:
+        row[GYRO], row[GYRO + 1], row[GYRO + 2] = s.gyro[0], s.gyro[1], s.gyro[2]
+    else:
+        row[MEAN_RATE] = 1.0
+        felt2 = 0.0
+        for k in range(3):
+            felt2 += squared(row[ACC + k] - GRAVITY * row[UP + k])
+        effort = min(1.0, math.sqrt(felt2) / FULL_EFFORT)
+        s.effort = max(s.effort * math.exp(-dt / EFFORT_MEMORY_S), effort)
+        row[WANDER] = DEVICE_TILT * s.effort
+        last = quaternion(s.last_q, 0)
+        if last != (0.0, 0.0, 0.0, 0.0) and dt > 0.0:
+            turn = logarithm(product(conjugate(last), q))
+            if squared(turn[0]) + squared(turn[1]) + squared(turn[2]) < squared(MOST_RATE * dt):
+                row[GYRO], row[GYRO + 1], row[GYRO + 2] = turn[0] / dt, turn[1] / dt, turn[2] / dt
+    s.last_q[0], s.last_q[1], s.last_q[2], s.last_q[3] = q

@@ -7,65 +7,76 @@ Method: commaai/rednose's checkpoints; T. D. Larsen et al., Incorporation of tim
 
 from __future__ import annotations
 
-import numpy as np
-
+from foottrack_service.fusion.compiled import compiled
 from foottrack_service.fusion.foot_filter_events import COLUMNS, Stamps
 from foottrack_service.fusion.foot_filter_kernel import NE, NX
+from foottrack_service.fusion.foot_filter_memory import KEPT, Feet, Foot
 from foottrack_service.rotations import Array
 
-KEPT = 640
-"""Events that are surely kept: 1 s at 400 Hz with two fixes per picture at 60 fps, and some."""
+
+@compiled
+def place(s: Foot, t: int) -> int:
+    """Make room for an event at ``t``, ns, behind all with the same or an earlier stamp; what is behind moves up.
+
+    Returns its index, its row is zero; 0 when ``t`` is before everything that is kept, and then nothing has changed.
+    """
+    i: int = s.n
+    while i > 0 and s.t[i - 1] > t:
+        i -= 1
+    full = s.n == 2 * KEPT
+    if s.n > 0 and i <= (KEPT if full else 0):
+        return 0
+    if full:
+        for j in range(KEPT):
+            s.t[j] = s.t[KEPT + j]
+            for k in range(COLUMNS):
+                s.rows[j, k] = s.rows[KEPT + j, k]
+            for k in range(NX):
+                s.X[j, k] = s.X[KEPT + j, k]
+            for k in range(NE):
+                for m in range(NE):
+                    s.P[j, k, m] = s.P[KEPT + j, k, m]
+        s.n = KEPT
+        i -= KEPT
+    for j in range(s.n, i, -1):
+        s.t[j] = s.t[j - 1]
+        for k in range(COLUMNS):
+            s.rows[j, k] = s.rows[j - 1, k]
+    s.t[i] = t
+    for k in range(COLUMNS):
+        s.rows[i, k] = 0.0
+    s.n += 1
+    return i
 
 
 class Timeline:
-    """Events 0 .. ``n`` - 1 with their stamps, rows, states and covariances."""
+    """Events 0 .. ``n`` - 1 with their stamps, rows, states and covariances, in a foot's memory."""
 
-    def __init__(self) -> None:
-        self.n = 0
-        self.t: Stamps = np.zeros(2 * KEPT, dtype=np.int64)
-        self.rows: Array = np.zeros((2 * KEPT, COLUMNS))
-        self.X: Array = np.zeros((2 * KEPT, NX))
-        self.P: Array = np.zeros((2 * KEPT, NE, NE))
+    def __init__(self, foot: Feet) -> None:
+        self._foot = foot
+        self.t: Stamps = foot["t"][0]
+        self.rows: Array = foot["rows"][0]
+        self.X: Array = foot["X"][0]
+        self.P: Array = foot["P"][0]
+
+    @property
+    def n(self) -> int:
+        """How many events there are."""
+        return int(self._foot["n"][0])
 
     def place(self, t: int) -> int:
-        """``append`` or ``insert``, as the stamp wants it; 0 when ``t`` is before everything that is kept."""
-        return self.append(t) if self.n == 0 or t >= self.t[self.n - 1] else self.insert(t)
-
-    def append(self, t: int) -> int:
-        """Make room for an event at ``t``, ns, not before the last one; returns its index, its row is zero."""
-        if self.n == 2 * KEPT:
-            for ring in (self.t, self.rows, self.X, self.P):
-                ring[:KEPT] = ring[KEPT:]
-            self.n = KEPT
-        i = self.n
-        self.t[i] = t
-        self.rows[i] = 0.0
-        self.n += 1
-        return i
-
-    def insert(self, t: int) -> int:
-        """Make room for a late event behind all with the same or an earlier stamp; what is behind moves up.
-
-        Returns the index, 0 when ``t`` is before everything that is kept: then nothing has changed.
-        """
-        place = int(np.searchsorted(self.t[: self.n], t, side="right"))
-        if place == 0:
-            return 0
-        shift = KEPT if self.n == 2 * KEPT else 0
-        if place - shift <= 0:
-            return 0
-        last = self.append(t)
-        place -= shift
-        self.t[place + 1 : last + 1] = self.t[place:last].copy()
-        self.rows[place + 1 : last + 1] = self.rows[place:last].copy()
-        self.t[place] = t
-        self.rows[place] = 0.0
-        return place
+        """``place`` for Python."""
+        return int(_place(self._foot, t))
 
     def restart(self, t: int) -> int:
         """Forget all events but the newest state, which now stands at ``t``, ns; returns its index, 0."""
         last = self.n - 1
         self.X[0], self.P[0], self.rows[0] = self.X[last].copy(), self.P[last].copy(), self.rows[last].copy()
         self.t[0] = t
-        self.n = 1
+        self._foot["n"] = 1
         return 0
+
+
+@compiled
+def _place(foot: Feet, t: int) -> int:
+    return place(foot[0], t)

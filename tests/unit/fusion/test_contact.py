@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from foottrack_service.fusion.contact import PEAK, QUIET, STILL_SIGMA, SeenMotion, stance_sigma, stillness
+from foottrack_service.fusion.contact import PEAK, QUIET, STILL_SIGMA, see, stance_sigma, stillness
 from foottrack_service.fusion.foot_filter_events import ACC, COLUMNS, GYRO, IMU, KIND, MEAN_RATE
 from foottrack_service.fusion.foot_filter_kernel import GRAVITY, NE, NX
+from foottrack_service.fusion.foot_filter_memory import SEEN_KEPT, new_foot
 from foottrack_service.rotations import Array
 
 STEP = 5_000_000
@@ -93,13 +94,18 @@ def test_a_smooth_push_is_no_stance_until_it_has_lasted_too_long_to_be_one() -> 
 
 
 def test_fixes_that_move_say_how_fast() -> None:
-    motion = SeenMotion()
+    foot = new_foot()
     for i in range(12):
-        motion.see(i * 16_000_000, np.array([0.1 * 0.016 * i, 0.0, 0.0]))
-    assert motion.speed == pytest.approx(0.1)
+        see(foot[0], i * 16_000_000, np.array([0.1 * 0.016 * i, 0.0, 0.0]))
+    assert foot["seen_speed"] == pytest.approx(0.1)
     for i in range(12, 40):
-        motion.see(i * 16_000_000, np.array([0.02, 0.001 * (i % 2), 0.0]))
-    assert motion.speed == 0.0
-    motion.clear()
-    motion.see(0, np.zeros(3))
-    assert motion.speed == 0.0
+        see(foot[0], i * 16_000_000, np.array([0.02, 0.001 * (i % 2), 0.0]))
+    assert foot["seen_speed"] == 0.0
+
+
+def test_more_fixes_than_are_kept_show_the_newest_motion() -> None:
+    foot = new_foot()
+    for i in range(2 * SEEN_KEPT):
+        see(foot[0], i * 3_000_000, np.array([0.0, 0.0, 0.2 * 0.003 * i]))
+    assert foot["seen"] == SEEN_KEPT
+    assert foot["seen_speed"] == pytest.approx(0.2)

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings
 from foottrack_service.fusion.foot_filter_inertial import InertialFilter
+from foottrack_service.fusion.foot_filter_memory import KEPT, new_foot
 from foottrack_service.fusion.interface import HeadSample, ImuSample, OpticalFix, Verdict
-from foottrack_service.fusion.timeline import KEPT, Timeline
+from foottrack_service.fusion.timeline import Timeline
 
 MS = 1_000_000
 
@@ -18,8 +19,8 @@ MS = 1_000_000
 @given(st.lists(st.integers(0, 200), min_size=1, max_size=60))
 @settings(deadline=None)
 def test_events_are_in_order_however_they_come(stamps: list[int]) -> None:
-    timeline = Timeline()
-    timeline.append(0)
+    timeline = Timeline(new_foot())
+    timeline.place(0)
     for number, t in enumerate(stamps, start=1):
         timeline.rows[timeline.place(t), 1] = number
     n = timeline.n
@@ -30,20 +31,20 @@ def test_events_are_in_order_however_they_come(stamps: list[int]) -> None:
 
 
 def test_a_full_ring_keeps_the_newest_half() -> None:
-    timeline = Timeline()
+    timeline = Timeline(new_foot())
     for t in range(2 * KEPT):
-        timeline.append(10 * t)
+        timeline.place(10 * t)
     assert timeline.n == 2 * KEPT
-    place = timeline.insert(10 * (2 * KEPT - 3) + 5)
+    place = timeline.place(10 * (2 * KEPT - 3) + 5)
     assert timeline.n == KEPT + 1
     assert timeline.t[place - 1 : place + 3].tolist() == [10 * (2 * KEPT - 3) + d for d in (0, 5, 10, 20)]
     assert timeline.t[0] == 10 * KEPT
 
 
 def test_what_is_too_late_changes_nothing() -> None:
-    timeline = Timeline()
+    timeline = Timeline(new_foot())
     for t in range(100, 200):
-        timeline.append(t)
+        timeline.place(t)
     assert timeline.place(99) == 0
     assert timeline.n == 100
 
