@@ -25,6 +25,7 @@ from foottrack_service.calibration.floor import FloorFlow
 from foottrack_service.calibration.flow import Flow, Refused
 from foottrack_service.calibration.heading import HeadingFlow
 from foottrack_service.calibration.mount import MountFlow
+from foottrack_service.calibration.mount_kept import KeptMount
 from foottrack_service.calibration.store import Store, StoreError
 from foottrack_service.config import Settings
 
@@ -72,13 +73,23 @@ class CalibrationDesk:
         return self._run(user, lambda: MountFlow(self._settings))
 
     async def run(self) -> None:
-        """Publish what is known, every 5 s, until cancelled."""
+        """Publish what is known, every 5 s, until cancelled; and keep what fusion finds of the mount meanwhile."""
         await self._publisher.ready()
-        while True:
-            self._recall()
-            for body in self._known.values():
-                self._publish(body)
-            await asyncio.sleep(REPEAT_S)
+        heard = self._bus.subscriber([f"{self._settings.user}/calibration"])
+        background = KeptMount(self._settings.camera.mount_hash)
+        try:
+            await heard.ready()
+            while True:
+                for received in heard.drain():
+                    background.take(received.message)
+                self._keep(background.due(self._bus.clock()))
+                self._recall()
+                for body in self._known.values():
+                    self._publish(body)
+                await asyncio.sleep(REPEAT_S)
+        finally:
+            self._keep(background.newest)
+            heard.close()
 
     @property
     def _floor(self) -> float:
@@ -105,13 +116,17 @@ class CalibrationDesk:
             self._busy = False
         self._known[_name(found)] = found
         self._publish(found)
-        if self._store is not None:
-            try:
-                self._store.keep(found)
-            except StoreError as error:
-                _log.warning("the calibration counts until the service ends: %s", error)
-                self._store = None
+        self._keep(found)
         return found
+
+    def _keep(self, found: Any) -> None:
+        if self._store is None or found is None:
+            return
+        try:
+            self._store.keep(found)
+        except StoreError as error:
+            _log.warning("the calibration counts until the service ends: %s", error)
+            self._store = None
 
     async def _watch(self, flow: Flow) -> Any:
         subscriber = self._bus.subscriber([f"{self._settings.user}/{stream}" for stream in flow.streams])

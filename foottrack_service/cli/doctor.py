@@ -97,6 +97,13 @@ async def _service(settings: Settings, brief: bool) -> list[Finding]:
         return found + await _streams(client, settings.user)
 
 
+def _slipped(times: int, found_again: bool) -> Finding:
+    text = f"it has moved on the headset {times} times since the service was started"
+    if found_again:
+        return Finding("note", "camera mount", f"{text}, and was found again")
+    return Finding("warning", "camera mount", text, "Fasten it; then look at your feet, or: foottrack calibrate mount")
+
+
 async def _streams(client: ControlClient, user: str) -> list[Finding]:
     health: dict[str, Any] = await client.request("status")
     found = [
@@ -131,6 +138,9 @@ async def _streams(client: ControlClient, user: str) -> list[Finding]:
             )
         )
     for name, counts in health["filters"].items():
+        slips = counts["rejected"].get("slipped", 0)
+        if slips:
+            found.append(_slipped(slips, found_again=bool(counts["accepted"].get("found", 0))))
         if name.rpartition("/")[2] not in SIDES:
             continue
         total = sum(counts["accepted"].get(kind, 0) for kind in ("marker", "depth"))

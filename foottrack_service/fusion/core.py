@@ -82,6 +82,11 @@ class FusionCore:
         return {f"{self._user}/{side}": foot.health for side, foot in self._feet.items()}
 
     @property
+    def mount_health(self) -> FilterHealth | None:
+        """Of the camera's mount (mount_watch); None when nobody watches it."""
+        return None if self._watch is None else self._watch.health
+
+    @property
     def deadline(self) -> int | None:
         """When the timer has to publish because nothing came; None before anything is known. ns."""
         return None if self._last_output is None else self._last_output + self._silence_ns
@@ -174,7 +179,9 @@ class FusionCore:
             self._feet[found.values.side].on_imu_calibration(found.values)
         elif isinstance(found, MountCalibration):
             if self._watch is not None:
-                self._watch.restart()
+                if self._watch.said(found.values):
+                    return
+                self._watch.restart(found.values)
             for foot in self._feet.values():
                 foot.on_mount(found.values)
 

@@ -17,10 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from foottrack_protocol.messages import Side
+from foottrack_protocol.messages import MountValues, Side
 from foottrack_service import rotations as rot
 from foottrack_service.fusion.foot_filter_optical import implausible
 from foottrack_service.fusion.interface import OpticalFix
+from foottrack_service.fusion.mount_kernel import COLUMNS, POINT, VALUE, collect
 from foottrack_service.rotations import Array
 
 PRIOR = np.array([0.03] * 3 + [0.02] * 3 + [0.005])
@@ -44,6 +45,8 @@ SLIP_TURN, SLIP_SHIFT = math.radians(0.3), 0.005
 SLIP_SIGMAS = 4.0
 SLIP_STANCES = 3
 """So many stances in a row must say so."""
+WORN_TURN, WORN_SHIFT = math.radians(0.1), 0.002
+"""rad, m per axis SD: what taking the headset off and putting it on again does to a mount at most."""
 GOOD_TURN, GOOD_SHIFT = math.radians(0.1), 0.002
 """rad, m per axis SD: what a calibration on request must reach."""
 
@@ -79,37 +82,40 @@ class MountEstimate:
 
 @dataclass(slots=True)
 class _Stance:
-    """Sums over one stance: of W, J' W J, J' W, J' W z, W z, z' W z (``square``) and p."""
-
     begun: int
     ended: int
     n: int
-    W: Array
-    JWJ: Array
-    JW: Array
-    JWz: Array
-    Wz: Array
-    square: float
+    sums: Array
+    """(11, 11), see mount_kernel."""
     p: Array
+    """Sum of the targets' places in the head frame, m."""
 
     def information(self) -> tuple[Array, Array]:
         """What it says of the 7 unknowns with its own point eliminated: matrix (7, 7) and vector (7,)."""
-        inverse = _inverse(self.W)
-        return self.JWJ - self.JW @ inverse @ self.JW.T, self.JWz - self.JW @ inverse @ self.Wz
+        S = self.sums
+        ways = S[:POINT, POINT:VALUE] @ _inverse(S[POINT:VALUE, POINT:VALUE])
+        return S[:POINT, :POINT] - ways @ S[POINT:VALUE, :POINT], S[:POINT, VALUE] - ways @ S[POINT:VALUE, VALUE]
 
     def misfit(self, matrix: Array, vector: Array) -> float:
         """What no mount explains, per component: about 1 / CORRELATED for a foot that stood."""
         values, _ = _solved(matrix, vector)
-        explained = self.Wz @ np.linalg.solve(self.W, self.Wz) + vector @ values
-        return float(self.square - explained) / (3.0 * self.n)
+        own = self.sums[POINT:VALUE, VALUE]
+        explained = own @ np.linalg.solve(self.sums[POINT:VALUE, POINT:VALUE], own) + vector @ values
+        return float(self.sums[VALUE, VALUE] - explained) / (3.0 * self.n)
 
 
 class MountCalibrator:
     """Takes fixes of standing feet as the *configured* mount gave them, and tells what that mount lacks."""
 
-    def __init__(self) -> None:
+    def __init__(self, known: MountValues | None = None) -> None:
+        """``known``: what an earlier use found; the headset may have been taken off since."""
         self._open: dict[Side, _Stance] = {}
-        self._matrix, self._vector = np.zeros((7, 7)), np.zeros(7)
+        self._matrix, self._vector, self._values = np.zeros((7, 7)), np.zeros(7), np.zeros(7)
+        if known is not None:
+            sigmas = [math.hypot(known.sigma_q, WORN_TURN)] * 3 + [math.hypot(known.sigma_p, WORN_SHIFT)] * 3
+            self._values[:6] = np.concatenate([rot.to_rotation_vector(known.q), known.p])
+            self._matrix[range(6), range(6)] = 1.0 / np.square(sigmas)
+            self._vector = self._matrix @ self._values
         self._seen, self._fixes = np.zeros(3), 0
         self._recent: deque[tuple[int, Array, Array]] = deque()
         self._slipping = 0
@@ -129,26 +135,17 @@ class MountCalibrator:
             stance = None
         if not standing:
             return
-        R = rot.to_matrix(fix.head.q)
-        z = fix.head.p + R @ fix.p
-        J = np.hstack([R @ _cross(fix.p), -R, -(R @ fix.p)[:, None]])
-        noise = HEAD_NOISE**2 + HEAD_TURN_NOISE**2 * float(fix.p @ fix.p)
-        W = _inverse(R @ fix.cov @ R.T + noise * np.eye(3)) / CORRELATED
         if stance is None:
-            self._open[side] = _Stance(
-                fix.t, fix.t, 1, W, J.T @ W @ J, J.T @ W, J.T @ W @ z, W @ z, float(z @ W @ z), fix.p
-            )
-            return
-        if stance.n >= LEAST_OF_STANCE and self._surprise(stance, J, W, z) > OUTLIER:
-            return
-        stance.n, stance.ended = stance.n + 1, fix.t
-        stance.W += W
-        stance.JWJ += J.T @ W @ J
-        stance.JW += J.T @ W
-        stance.JWz += J.T @ W @ z
-        stance.Wz += W @ z
-        stance.square += float(z @ W @ z)
-        stance.p = stance.p + fix.p
+            stance = self._open[side] = _Stance(fix.t, fix.t, 0, np.zeros((COLUMNS, COLUMNS)), np.zeros(3))
+        noise = HEAD_NOISE**2 + HEAD_TURN_NOISE**2 * float(fix.p @ fix.p)
+        picture = (stance.sums, self._values, fix.head.p, fix.head.q, fix.p, fix.cov, noise)
+        if stance.n >= LEAST_OF_STANCE:
+            # A mount that is not known yet moves what stands still: that is no outlier.
+            slack = 4.0 if self._matrix.any() else 4.0 * CORRELATED**2
+            if collect(*picture, 0.0) > OUTLIER * slack:
+                return
+        if math.isfinite(collect(*picture, 1.0 / CORRELATED)):
+            stance.n, stance.ended, stance.p = stance.n + 1, fix.t, stance.p + fix.p
 
     def recentred(self) -> None:
         """The stage moved: stances that are under way lie in the old one."""
@@ -156,7 +153,7 @@ class MountCalibrator:
 
     def estimate(self) -> MountEstimate | None:
         """What is known so far, None before the first stance is over."""
-        if not self._matrix.any():
+        if self._fixes == 0:
             return None
         values, covariance = _solved(self._matrix, self._vector)
         sd = np.sqrt(np.diag(covariance))
@@ -183,6 +180,7 @@ class MountCalibrator:
         self._matrix += matrix
         self._vector += vector
         self._notice_a_slip()
+        self._values, _ = _solved(self._matrix, self._vector)
 
     def _notice_a_slip(self) -> None:
         recent_matrix = np.sum([r[1] for r in self._recent], axis=0)
@@ -199,14 +197,6 @@ class MountCalibrator:
             self._slipping = 0
             self._matrix, self._vector = np.zeros((7, 7)), np.zeros(7)
             self._recent.clear()
-
-    def _surprise(self, stance: _Stance, J: Array, W: Array, z: Array) -> float:
-        values, _ = _solved(self._matrix, self._vector)
-        point = np.linalg.solve(stance.W, stance.Wz - stance.JW.T @ values)
-        off = z - J @ values - point
-        # A mount that is not known yet moves what stands still: that is no outlier.
-        slack = CORRELATED * W if self._matrix.any() else W / CORRELATED
-        return float(off @ slack @ off) / 4.0
 
 
 def _solved(matrix: Array, vector: Array) -> tuple[Array, Array]:

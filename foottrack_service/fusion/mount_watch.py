@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import logging
 import math
+from collections import deque
 
-from foottrack_protocol.messages import MountCalibration, MountValues, Side
+from foottrack_protocol.messages import FilterHealth, MountCalibration, MountValues, Side
 from foottrack_service.fusion.interface import OpticalFix
 from foottrack_service.fusion.mount_calibration import MountCalibrator
 
 PERIOD_S = 5.0
 """Between two publications."""
-SPACING_S = 0.03
-"""Between two fixes of a foot that are looked at: neighbours say the same, and each costs 60 us."""
+KEPT = 128
+"""So many of our own results are known again when they come back."""
 
 _log = logging.getLogger(__name__)
 
@@ -23,23 +24,22 @@ class MountWatch:
     def __init__(self, base: str) -> None:
         self._base = base
         self._due: int | None = None
+        self._said: deque[MountValues] = deque(maxlen=KEPT)
+        self.slips = self._found_since = 0
         self.restart()
 
-    def restart(self) -> None:
+    def restart(self, known: MountValues | None = None) -> None:
         """Somebody knows better: what was seen so far may have been with another mount."""
-        self._calibrator = MountCalibrator()
-        self._taken: dict[Side, int] = {}
+        self._calibrator = MountCalibrator(known if known is not None and known.base == self._base else None)
+        self._said.clear()
         self._slips = 0
 
     def add(self, side: Side, fix: OpticalFix, standing: bool) -> None:
         """A fix that the filter believed, as the *configured* mount gave it, and whether its foot stands."""
-        last = self._taken.get(side)
-        if last is not None and 0.0 <= (fix.t - last) * 1e-9 < SPACING_S:
-            return
-        self._taken[side] = fix.t
         self._calibrator.add(side, fix, standing)
         if self._calibrator.slips > self._slips:
             self._slips = self._calibrator.slips
+            self.slips, self._found_since = self.slips + 1, 0
             _log.warning(
                 "the camera has moved on the headset: feet will be off until it is calibrated anew, which goes on in "
                 "the background; look at your feet for a while, or run: foottrack calibrate mount"
@@ -48,6 +48,16 @@ class MountWatch:
     def recentred(self) -> None:
         """The stage moved."""
         self._calibrator.recentred()
+
+    def said(self, values: MountValues) -> bool:
+        """Whether this is our own result, which comes back as somebody has kept it."""
+        return values in self._said
+
+    @property
+    def health(self) -> FilterHealth:
+        """How often it was found since it last slipped, and how often it slipped."""
+        slipped = {"slipped": self.slips} if self.slips else {}
+        return FilterHealth(accepted={"found": self._found_since}, rejected=slipped)
 
     def found(self, now: int) -> MountCalibration | None:
         """The correction, every 5 s once feet are better off with it; ``now`` in ns."""
@@ -61,12 +71,13 @@ class MountWatch:
         if not math.isfinite(sum(p) + sum(q)):
             self.restart()
             return None
-        return MountCalibration(
-            values=MountValues(
-                p=(p[0], p[1], p[2]),
-                q=(q[0], q[1], q[2], q[3]),
-                sigma_p=estimate.sigma_p,
-                sigma_q=estimate.sigma_q,
-                base=self._base,
-            )
+        values = MountValues(
+            p=(p[0], p[1], p[2]),
+            q=(q[0], q[1], q[2], q[3]),
+            sigma_p=estimate.sigma_p,
+            sigma_q=estimate.sigma_q,
+            base=self._base,
         )
+        self._said.append(values)
+        self._found_since += 1
+        return MountCalibration(values=values)

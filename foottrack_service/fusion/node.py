@@ -41,7 +41,7 @@ class _LiveCore:
     """The core, its results published as they come, and how long an IMU's sample took to become a pose."""
 
     def __init__(self, bus: Bus, settings: Settings, publisher: Publisher) -> None:
-        self._bus = bus
+        self._bus, self._user = bus, settings.user
         self._publisher = publisher
         self._core = FusionCore(settings, uuid.uuid4().hex[:12], self._send)
         self._sampled: int | None = None
@@ -66,6 +66,9 @@ class _LiveCore:
                 reported = now
                 for name, health in core.health.items():
                     self._bus.health.filter(name, health.accepted, health.rejected)
+                mount = core.mount_health
+                if mount is not None:
+                    self._bus.health.filter(f"{self._user}/mount", mount.accepted, mount.rejected)
             deadline = core.deadline
             wait_ns = _IDLE_NS if deadline is None else deadline - clock()
             await asyncio.sleep(max(wait_ns, 1_000_000) * 1e-9)
