@@ -27,6 +27,7 @@ from foottrack_service.fusion.interface import (
     Whereabouts,
 )
 from foottrack_service.fusion.ladder import BALL_68_OF_ONE_AXIS, Ladder
+from foottrack_service.fusion.mount_calibration import MountCalibrator
 from foottrack_service.fusion.pictures_only import PicturesOnlyFilter
 from foottrack_service.rotations import IDENTITY, Array
 
@@ -136,12 +137,14 @@ def warm_up() -> None:
     """Compile the kernels, or read them from the cache, before the first sample needs them, and say so."""
     if not is_compiled():
         _log.info("compiling the foot filter for this machine: about half a minute, this once")
-    trial = ErrorStateFilter(FootSettings(), "left")
+    trial, mount = ErrorStateFilter(FootSettings(), "left"), MountCalibrator()
     step = 5_000_000
     for i in range(40):
         trial.on_imu(ImuSample(i * step, np.array([0.0, 9.80665, 0.0]), np.zeros(3), None))
         head = HeadSample(i * step, np.array([0.0, 1.6, 0.0]), IDENTITY)
         p, q = np.array([-0.1, -1.55, -0.15]), np.array(FootSettings().marker.q)
-        trial.on_fix(OpticalFix(head.t, "marker", p, q, None, 1e-6 * np.eye(3), 1.0, 50.0, head, head), head.t)
+        fix = OpticalFix(head.t, "marker", p, q, None, 1e-6 * np.eye(3), 1.0, 50.0, head, head)
+        trial.on_fix(fix, head.t)
+        mount.add("left", fix, standing=True)
     trial.estimate(40 * step)
     _log.debug("the foot filter is ready")

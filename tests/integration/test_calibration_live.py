@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from foottrack_protocol.messages import FloorCalibration, FloorValues, HeadPose
+from foottrack_protocol.messages import FloorCalibration, FloorValues, HeadPose, MountCalibration, MountValues
 from foottrack_service.app import Service
 from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.errors import ControlError
@@ -81,6 +81,38 @@ def test_the_floor_is_found_published_kept_and_known_to_the_next_service(run: Ru
                 await results.ready()
                 async for received in results:
                     assert received.message.data.model_dump() == found
+                    return
+
+    run(scenario())
+
+
+def test_what_fusion_finds_of_the_mount_is_kept_for_the_next_start(run: Run, tmp_path) -> None:
+    config = settings_with()
+    store = Store(tmp_path, "user", "default")
+    values = {"p": (0.01, 0.0, 0.002), "q": (0.0, 0.0, 0.0, 1.0), "sigma_p": 0.001, "sigma_q": 0.001}
+    mount = MountCalibration(values=MountValues(**values, base=config.camera.mount_hash))
+
+    async def scenario() -> None:
+        async with Service(config, store) as service:
+            with Bus.connect(service.endpoints) as client:
+                publisher = client.publisher("fusion")
+                await publisher.ready()
+                for base in ("another", config.camera.mount_hash):
+                    found = MountCalibration(values=MountValues(**values, base=base))
+                    publisher.publish("user", "calibration", client.clock(), found)
+                heard = client.subscriber(["user/calibration"])
+                await heard.ready()
+                async for received in heard:
+                    if received.message.src == "calibration":
+                        assert received.message.data == mount
+                        break
+        assert store.load() == [mount]
+        async with Service(config, store) as service:
+            with Bus.connect(service.endpoints) as client:
+                heard = client.subscriber(["user/calibration"])
+                await heard.ready()
+                async for received in heard:
+                    assert (received.message.src, received.message.data) == ("calibration", mount)
                     return
 
     run(scenario())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from foottrack_protocol.messages import MountValues
 from foottrack_service import rotations as rot
 from foottrack_service.fusion.interface import HeadSample, OpticalFix
 from foottrack_service.fusion.mount_calibration import MountCalibrator
@@ -54,6 +55,27 @@ def test_nothing_is_said_before_a_stance_is_over_and_little_before_the_head_has_
     found = calibrator.estimate()
     assert found is not None
     assert not found.good and not found.useful
+
+
+def test_what_is_known_already_is_where_it_begins() -> None:
+    a, b, c = SHIFT.tolist()
+    x, y, z, w = TURN.tolist()
+    known = MountValues(p=(a, b, c), q=(x, y, z, w), sigma_p=0.001, sigma_q=0.001, base="")
+    calibrator = MountCalibrator(known)
+    assert calibrator.estimate() is None
+    seen(calibrator, 0.0, 8.0, (TURN, SHIFT))
+    found, fresh = calibrator.estimate(), MountCalibrator()
+    seen(fresh, 0.0, 8.0, (TURN, SHIFT))
+    without = fresh.estimate()
+    assert found is not None and without is not None
+    assert np.rad2deg(rot.angle_between(found.q, TURN)) < 0.1
+    assert found.sigma_q < without.sigma_q
+    # A mount that has moved since is found all the same.
+    seen(calibrator, 8.0, 50.0, NONE)
+    assert calibrator.slips == 1
+    moved = calibrator.estimate()
+    assert moved is not None
+    assert np.rad2deg(rot.angle_between(moved.q, rot.IDENTITY)) < 0.15
 
 
 def test_a_slipped_mount_is_noticed_and_found_anew() -> None:

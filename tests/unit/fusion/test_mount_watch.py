@@ -75,6 +75,27 @@ def test_a_replay_finds_the_same_to_the_bit_though_the_recording_holds_what_was_
     assert [encode(out) for out in again] == [encode(out) for out in calibrated]
 
 
+def test_its_own_result_that_somebody_kept_and_repeats_changes_nothing(calibrated: list[Message]) -> None:
+    kept = [(out.t_pub + 10**8, out._replace(src="calibration")) for out in calibrated if out.stream == "calibration"]
+    again = fuse(sorted([*arrivals(), *kept], key=lambda each: each[0]), FusionCore(ON))
+    assert [encode(out) for out in again] == [encode(out) for out in calibrated]
+
+
+def test_what_was_kept_counts_from_the_first_picture_and_is_not_given_up_for_less(calibrated: list[Message]) -> None:
+    kept = [out for out in calibrated if out.stream == "calibration"][-1]
+    seconds = 9.0
+    outs = list(fuse([(0, kept._replace(src="calibration", t=0, t_pub=0)), *arrivals(seconds)], FusionCore(ON)))
+    said = [out.data.values for out in outs if out.stream == "calibration"]
+    assert said
+    for values in said:
+        assert values.sigma_q <= np.hypot(kept.data.values.sigma_q, np.deg2rad(0.1))
+        assert np.rad2deg(rot.angle_between(np.array(values.q), TURN)) < 0.3
+    scenario = simulate("head-moving", 31, seconds=seconds)
+    for side, run in collect(outs).items():
+        late = run.cut(run.t > 2e9)
+        assert np.linalg.norm(late.p - ScenarioTruth(scenario, side).position(late.t), axis=1).mean() < 0.008
+
+
 def test_without_the_watch_a_recording_s_own_result_is_applied(calibrated: list[Message]) -> None:
     found = next(out for out in calibrated if out.stream == "calibration")
     with_it = list(fuse([(0, found._replace(t=0, t_pub=0)), *arrivals()], FusionCore(OFF)))
@@ -99,5 +120,7 @@ def test_what_a_person_calibrated_is_taken() -> None:
 
 
 def test_a_slip_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
-    list(fuse(arrivals(34.0, frm=16.0), FusionCore(ON)))
+    core = FusionCore(ON)
+    list(fuse(arrivals(34.0, frm=16.0), core))
+    assert core.mount_health is not None and core.mount_health.rejected == {"slipped": 1}
     assert len([record for record in caplog.records if "moved on the headset" in record.getMessage()]) == 1
