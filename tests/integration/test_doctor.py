@@ -18,6 +18,7 @@ from foottrack_protocol.messages import HeadPose, Imu
 from foottrack_service.app import Service
 from foottrack_service.bus import Bus
 from foottrack_service.cli import doctor_devices
+from foottrack_service.cli.doctor import _streams
 from foottrack_service.cli.doctor_clocks import clock, judged, stamps
 from foottrack_service.cli.main import app
 from foottrack_service.config import BusSettings, Settings
@@ -128,3 +129,17 @@ def test_two_outputs_into_one_application_are_warned_of(tmp_path: Path) -> None:
         ("bridges", "warning"),
     ]
     assert "every foot twice" in found[-1]["text"]
+
+
+@pytest.mark.parametrize(("found", "level"), [(0, "warning"), (3, "note")])
+def test_a_mount_that_slipped_is_said(run: Run, found: int, level: str) -> None:
+    async def scenario() -> None:
+        settings = Settings(bus=BusSettings.beginning_at("0").model_dump(exclude={"curve"}))
+        async with Service(settings) as service:
+            service.bus.health.filter("anna/mount", {"found": found}, {"slipped": 1})
+            with Bus.connect(service.endpoints) as bus:
+                said = [each for each in await _streams(bus.control(), "user") if each.subject == "camera mount"]
+        assert [each.level for each in said] == [level]
+        assert "moved on the headset" in said[0].text
+
+    run(scenario())

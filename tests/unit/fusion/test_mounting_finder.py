@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Any
 
 import numpy as np
@@ -12,11 +14,24 @@ from test_imu_mounting import one_step
 from foottrack_protocol.messages import Imu, ImuCalibration
 from foottrack_service import rotations as rot
 from foottrack_service.bus import Broker, Bus
+from foottrack_service.bus.control import ControlServer
 from foottrack_service.cli.calibrate_mounting import MountingFinder, calibrate
 from foottrack_service.cli.running import CommandFailed
 from foottrack_service.config import FootSettings, Settings
 
 TURN = [-0.6, -1.5, 0.4]
+
+
+@asynccontextmanager
+async def told_the_time(broker: Broker) -> AsyncIterator[Settings]:
+    """Where the command finds the broker, and a control socket that tells the time."""
+    server = ControlServer(broker.context, "tcp://127.0.0.1:0", {})
+    serving = asyncio.ensure_future(server.run())
+    try:
+        yield Settings(bus=broker.endpoints.model_copy(update={"control": server.endpoint}))
+    finally:
+        server.close()
+        await serving
 
 
 @pytest.mark.parametrize("kind", ["raw", "fused"])
@@ -66,7 +81,8 @@ def test_what_is_found_is_published(broker: Broker, bus: Bus, run: Any) -> None:
         await heard.ready()
         playing = asyncio.create_task(play())
         try:
-            found = await calibrate(Settings(bus=broker.endpoints), 20.0, lambda text: None)
+            async with told_the_time(broker) as settings:
+                found = await calibrate(settings, 20.0, lambda text: None)
             while True:
                 for received in heard.drain():
                     return found, received.message.data
@@ -81,5 +97,9 @@ def test_what_is_found_is_published(broker: Broker, bus: Bus, run: Any) -> None:
 
 
 def test_without_imus_it_says_so(broker: Broker, run: Any) -> None:
+    async def alone() -> None:
+        async with told_the_time(broker) as settings:
+            await calibrate(settings, 20.0, lambda text: None)
+
     with pytest.raises(CommandFailed, match="no IMU is heard"):
-        run(calibrate(Settings(bus=broker.endpoints), 20.0, lambda text: None))
+        run(alone())
