@@ -45,7 +45,6 @@ test: lint
 engines:
 	-tests/clients/install_godot.sh
 	-tests/clients/install_mono.sh
-	-tests/clients/install_mono.sh
 	-tests/install_libraries.sh
 
 test-clients: setup engines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from typing import Annotated
 
 import typer
@@ -71,6 +72,7 @@ async def _serve(settings: Settings) -> None:
 
 async def _one_node(name: str, settings: Settings) -> None:
     from foottrack_service.app import NODES
+    from foottrack_service.bus.log import BusLogHandler
     from foottrack_service.bus.timesync import SyncedClock
 
     async with joined(settings) as bus:
@@ -78,4 +80,12 @@ async def _one_node(name: str, settings: Settings) -> None:
         if own_clock and isinstance(bus.clock, SyncedClock):
             raise CommandFailed(f"the {name}'s stamps are of its own host's clock: run it on the service's host")
         typer.echo(f"{name} runs on {settings.bus.ingress}. Ctrl-C ends it.", err=True)
-        await asyncio.shield(asyncio.ensure_future(NODES[name].run(bus, settings)))
+        # Its counters stay in this process: what it drops is told in sys/log.
+        publisher = bus.publisher(name)
+        await publisher.ready()
+        telling = BusLogHandler(publisher, clock=bus.clock)
+        logging.getLogger().addHandler(telling)
+        try:
+            await asyncio.shield(asyncio.ensure_future(NODES[name].run(bus, settings)))
+        finally:
+            logging.getLogger().removeHandler(telling)

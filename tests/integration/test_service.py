@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 import os
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from foottrack_protocol.frames import STANDARD_GRAVITY
 from foottrack_protocol.messages import HeadPose, Imu, Optical
 from foottrack_service.app import NODES, Node, NodeFailed, Service, recorder_node
 from foottrack_service.bus.connection import Bus
+from foottrack_service.cli.service import _one_node
 from foottrack_service.config import BusSettings, Settings
 from foottrack_service.evaluation import datasets
 from foottrack_service.evaluation.truth import TruthTrack
@@ -32,7 +34,7 @@ UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 def settings_with(**sections: Any) -> Settings:
-    return Settings(bus=BusSettings.beginning_at("0").model_dump(), **sections)
+    return Settings(**{"bus": BusSettings.beginning_at("0").model_dump(), **sections})
 
 
 async def poses_until(subscriber: Any, done: asyncio.Future[Any]) -> list[Any]:
@@ -248,5 +250,27 @@ def test_feet_without_imu_come_by_head_and_tags(run: Run) -> None:
                     if right is not None and right.stage == "marker":
                         assert right.ankle.p[0] == pytest.approx(0.1, abs=0.02)
                         return
+
+    run(scenario())
+
+
+def test_a_node_in_a_process_of_its_own_tells_its_trouble_on_the_bus(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def noisy(bus: Bus, settings: Settings) -> None:
+        logging.getLogger("foottrack_service.imu.node").warning("imu-left dropped: 3 checksum")
+        await asyncio.Event().wait()
+
+    monkeypatch.setitem(NODES, "imu", Node("imu", noisy))
+
+    async def scenario() -> None:
+        async with Service(settings_with()) as service:
+            told = service.bus.subscriber(["sys/log"])
+            await told.ready()
+            node = asyncio.ensure_future(_one_node("imu", settings_with(bus=service.endpoints.model_dump())))
+            async for received in told:
+                if received.message.src == "imu":
+                    assert received.message.data.message == "imu-left dropped: 3 checksum"
+                    break
+            node.cancel()
+            await asyncio.gather(node, return_exceptions=True)
 
     run(scenario())
