@@ -19,15 +19,25 @@ _TOGETHER_S = 0.1
 """Feet that leave the floor within this jump."""
 _START_SPEED, _START_WAY, _START_TURN = 0.9, 0.07, 0.17
 """m/s, m and rad at the apex of a first step: more, and it goes somewhere or turns."""
-_FIRST_WAY = 0.15
-"""m: more at its end, and the first step was none in place after all."""
+_UNSURE_TURN = 0.07
+"""rad: what has turned so far at the top waits for its end, when twice as much is known."""
+_FIRST_WAY, _FIRST_TURN = 0.15, 0.28
+"""m, rad: more at its end, and the first step was none in place after all."""
+_LITTLE_TURN, _SECOND_TURN = 0.42, 0.2
+"""rad: up to the first at its end, it may be that somebody walks in place and turns. One who turns on the spot has with
+the next step turned by more than the second at its top."""
+_TURNING_S, _LAST_TURN = 1.5, 0.2
+"""Whoever turned with a step so short a while ago, does so until a step turns by less than this, rad."""
 _WALK_SPEED, _WALK_WAY = 0.8, 0.28
 """m/s and m of a step in the midst of walking in place: more, and the person really walks."""
 _LEAST_INTERVAL_S, _LONGEST_INTERVAL_S = 0.2, 2.0
 _FIRST_SHARE = 0.8
 """Of a step's duration: its swing. Good for the first step, when no interval is known."""
 _STOP_SHARE, _STOP_PLUS_S = 1.5, 0.1
-_SOONEST_STOP_S, _LATEST_STOP_S = 0.25, 0.9
+_SOONEST_STOP_S, _LATEST_STOP_S = 0.25, 0.6
+_SLOW_SHARE, _SLOW_PLUS_S = 1.15, 0.05
+"""Who takes less than a step a second stands longer than that at every step, and does not stop with each (at 0.8
+steps/s 0.6 s made 34 walks of 12)."""
 _FIRST_STOP_S = 0.7
 """Before three double supports are known."""
 _HELD_SHARE, _HELD_S = 2.5, 1.0
@@ -46,13 +56,21 @@ class Feet(NamedTuple):
 class _Swing:
     """What is known of a foot's swing."""
 
-    __slots__ = ("counted", "first", "jump", "number", "off", "real", "x", "yaw", "z")
+    __slots__ = ("counted", "first", "jump", "most_turn", "number", "off", "real", "unsure", "x", "yaw", "z")
 
     def __init__(self, off: int, number: int, foot: FootSample) -> None:
         self.off, self.number = off, number
         self.x, _, self.z = foot.p
-        self.yaw = yaw_of(foot)
-        self.counted = self.first = self.jump = self.real = False
+        self.yaw, self.most_turn = yaw_of(foot), _FIRST_TURN
+        self.counted = self.first = self.jump = self.real = self.unsure = False
+
+    def way(self, foot: FootSample) -> float:
+        """Over the floor since the heel left, m."""
+        return math.hypot(foot.p[0] - self.x, foot.p[2] - self.z)
+
+    def turned(self, foot: FootSample) -> float:
+        """Since then, rad."""
+        return abs(_wrapped(yaw_of(foot) - self.yaw))
 
 
 class Steps:
@@ -74,6 +92,8 @@ class Steps:
         self._supports: deque[float] = deque(maxlen=3)
         self._landed: int | None = None
         self._moved: int | None = None
+        self._turned: int | None = None
+        self._turned_little: int | None = None
         self._t: int | None = None
 
     def cadence(self, t: int) -> float:
@@ -137,6 +157,8 @@ class Steps:
             mean = phases.apex / max((at - current.off) * 1e-9, 0.05)
             self._model.event(name, 1.0 / self.step_s, phases.apex, mean)
         if name == "foot_strike":
+            if current is not None and current.counted and not self.walking:
+                self._judge_late(current, foot, at, events)
             self._swings[side] = None
             self._landed = at
 
@@ -145,15 +167,33 @@ class Steps:
         swing.number, swing.counted = self.count, True
         if self.walking:
             return
-        ahead, way = math.hypot(foot.v[0], foot.v[2]), math.hypot(foot.p[0] - swing.x, foot.p[2] - swing.z)
-        turned = abs(_wrapped(yaw_of(foot) - swing.yaw))
-        if ahead > _START_SPEED or way > _START_WAY or turned > _START_TURN:
+        turned, second = swing.turned(foot), _recent(self._turned_little, at)
+        self._turned_little = None
+        goes = math.hypot(foot.v[0], foot.v[2]) > _START_SPEED or swing.way(foot) > _START_WAY
+        if goes or turned > (_SECOND_TURN if second else _START_TURN):
             swing.real = True
-            return
+        elif not second and (turned > _UNSURE_TURN or _recent(self._turned, at)):
+            swing.unsure = True
+        else:
+            swing.most_turn = _LITTLE_TURN if second else _FIRST_TURN
+            self._begin(swing, 2.0 * (at - swing.off) * 1e-9, events)
+
+    def _judge_late(self, swing: _Swing, foot: FootSample, at: int, events: list[Event]) -> None:
+        """At the end of a step that did not begin a walk at its top."""
+        turned, turning = swing.turned(foot), _recent(self._turned, at)
+        here = swing.unsure and swing.way(foot) < _FIRST_WAY
+        if here and turned < (_LAST_TURN if turning else _FIRST_TURN):
+            self._begin(swing, (at - swing.off) * 1e-9, events)
+        elif here and not turning and turned < _LITTLE_TURN:
+            self._turned_little = at
+        elif turned > _LAST_TURN:
+            self._turned = at
+
+    def _begin(self, swing: _Swing, swing_s: float, events: list[Event]) -> None:
         self.walking, self.stopped_ns, swing.first = True, None, True
         self._intervals.clear()
         self._last = {"toe_off": swing.off}
-        self.step_s = min(max(2.0 * (at - swing.off) * 1e-9 / _FIRST_SHARE, 0.4), 1.2)
+        self.step_s = min(max(swing_s / _FIRST_SHARE, 0.4), 1.2)
         events.append((swing.off, "first_step", None, swing.number))
 
     def _interval(self, name: str, at: int) -> None:
@@ -167,7 +207,9 @@ class Steps:
             self.step_s = median(self._intervals)
 
     def _goes(self, swing: _Swing, foot: FootSample) -> bool:
-        ahead, way = math.hypot(foot.v[0], foot.v[2]), math.hypot(foot.p[0] - swing.x, foot.p[2] - swing.z)
+        ahead, way = math.hypot(foot.v[0], foot.v[2]), swing.way(foot)
+        if swing.first and swing.turned(foot) > swing.most_turn:
+            return True
         return way > (_FIRST_WAY if swing.first else _WALK_WAY) or (ahead > _WALK_SPEED and way > 0.5 * _WALK_WAY)
 
     def _really_walks(self, swing: _Swing, events: list[Event]) -> None:
@@ -182,8 +224,10 @@ class Steps:
         if left.standing and right.standing and self._landed is not None:
             limit = _FIRST_STOP_S
             if len(self._supports) == self._supports.maxlen:
-                limit = _STOP_SHARE * median(self._supports) + _STOP_PLUS_S
-            if (t - self._landed) * 1e-9 > min(max(limit, _SOONEST_STOP_S), _LATEST_STOP_S):
+                usual = median(self._supports)
+                latest = max(_LATEST_STOP_S, _SLOW_SHARE * usual + _SLOW_PLUS_S)
+                limit = min(max(_STOP_SHARE * usual + _STOP_PLUS_S, _SOONEST_STOP_S), latest)
+            if (t - self._landed) * 1e-9 > limit:
                 self._end(self._landed, events)
         elif waited > max(_HELD_S, _HELD_SHARE * self.step_s):
             self._end(self._moved, events)
@@ -192,6 +236,10 @@ class Steps:
         self.walking, self.stopped_ns = False, at
         self._model.stop()
         events.append((at, "stop", None, self.count))
+
+
+def _recent(then: int | None, t: int) -> bool:
+    return then is not None and (t - then) * 1e-9 < _TURNING_S
 
 
 def yaw_of(foot: FootSample) -> float:

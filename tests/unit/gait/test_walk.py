@@ -178,6 +178,29 @@ def test_real_walking_turning_jumping_and_squats_do_not_move_the_avatar():
     assert out.state.steps == 0
 
 
+@pytest.mark.parametrize("first", [0.30, 0.36, 0.40])
+def test_a_turn_on_the_spot_that_begins_gently_and_ends_gently_is_no_walk(first):
+    left, right = marching(1.4, 0.11, 5.0, begin=1.0, turn=0.8)
+    turns = [first] + [0.8] * (len(left.begins) + len(right.begins) - 2) + [first]
+    begins = sorted((begin, foot) for foot in (left, right) for begin in foot.begins)
+    for foot in (left, right):
+        foot.turns = [turn for turn, (_, owner) in zip(turns, begins, strict=True) if owner is foot]
+    outs = feed(ours(), left, right, 7.0)
+    assert outs[-1][1].state.steps == len(begins)
+    assert not events(outs, "first_step")
+    assert max(out.ik.speed for _, out in outs) == 0.0
+
+
+@pytest.mark.parametrize("turn", [0.1, 0.2, 0.33])
+def test_whoever_turns_while_walking_in_place_walks_from_the_second_step_on(turn):
+    left, right = marching(1.7, 0.15, 6.0, turn=turn)
+    outs = feed(ours(), left, right, 8.0)
+    assert outs[-1][1].state.steps == len(left.begins) + len(right.begins)
+    ((began, _, _),) = events(outs, "first_step")
+    assert began < sorted(left.begins + right.begins)[1] + 0.1
+    assert np.median(column(outs, lambda out: out.ik.speed)[3 * HZ : 5 * HZ]) > 0.8
+
+
 def test_from_walking_in_place_to_walking_through_the_room():
     place, room = marching(1.7, 0.15, 4.0), marching(1.7, 0.12, 9.0, begin=4.3, shift=1.1)
 

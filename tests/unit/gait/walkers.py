@@ -20,7 +20,8 @@ class Foot:
     """
 
     def __init__(self, x, begins, swing, peak, shift=0.0, turn=0.0):
-        self.x, self.begins, self.swing, self.peak, self.shift, self.turn = x, list(begins), swing, peak, shift, turn
+        self.x, self.begins, self.swing, self.peak, self.shift = x, list(begins), swing, peak, shift
+        self.turns = [turn] * len(self.begins)
 
     def height(self, t):
         share = self._share(t)
@@ -29,7 +30,8 @@ class Foot:
     def sample(self, t):
         share, done = self._share(t), sum(begin + self.swing <= t for begin in self.begins)
         eased = share - math.sin(2 * math.pi * share) / (2 * math.pi)
-        way, yaw = self.shift * (done + eased), self.turn * (done + eased)
+        way = self.shift * (done + eased)
+        yaw = sum(self.turns[:done]) + (eased * self.turns[done] if eased and done < len(self.turns) else 0.0)
         flying = 0.0 < share < 1.0
         vy = self.peak * math.pi / self.swing * math.sin(2 * math.pi * share)
         ahead = self.shift / self.swing * (1 - math.cos(2 * math.pi * share)) if flying else 0.0
