@@ -9,7 +9,7 @@ from typing import Self
 
 from foottrack_client import Endpoints
 
-TIMEOUT_S = 10.0
+TIMEOUT_S = 40.0
 MORE, LONG, COMMAND = 1, 2, 4
 
 
