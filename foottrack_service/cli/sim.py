@@ -33,7 +33,7 @@ def sim(
     ] = None,
     imu_hz: Annotated[float, typer.Option("--imu-hz", min=20.0, max=1000.0, help="Rate of the IMUs.")] = 100.0,
     imu: Annotated[
-        str, typer.Option("--imu", help="fused (a BNO-like device) or raw (accelerometer and gyro).")
+        str, typer.Option("--imu", help="fused (its own attitude), raw (accelerometer and gyro) or bno08x (all).")
     ] = "fused",
     feet: Annotated[str, typer.Option("--feet", help="mild or hard (impacts, clipping, soft soles).")] = "mild",
     out: Annotated[
@@ -67,7 +67,7 @@ def scenario_for(task: str, seed: int, settings: Settings, **options: Any) -> An
     if task not in TASKS:
         known = "\n".join(f"  {each.name:15} {each.description}" for each in TASKS.values())
         raise CommandFailed(f"no task is called {task!r}; there are:\n{known}", EXIT_USAGE)
-    choices: dict[str, tuple[str, ...]] = {"imu": ("fused", "raw"), "feet": ("mild", "hard")}
+    choices: dict[str, tuple[str, ...]] = {"imu": ("fused", "raw", "bno08x"), "feet": ("mild", "hard")}
     for option, known_values in choices.items():
         if options.get(option, known_values[0]) not in known_values:
             raise CommandFailed(f"--{option} is {' or '.join(known_values)}, not {options[option]!r}", EXIT_USAGE)

@@ -22,6 +22,7 @@ from foottrack_service.evaluation.smoother import smoothed
 from foottrack_service.evaluation.truth import Flags
 from foottrack_service.rotations import Array
 from foottrack_service.simulation.faults import CameraBlackout
+from foottrack_service.simulation.imu import ImuKind
 from foottrack_service.simulation.scenario import Scenario, simulate
 from foottrack_service.simulation.truth import FootTrack
 
@@ -44,7 +45,7 @@ class Job:
     filter: FilterName
     seconds: float | None = None
     imu_hz: float = 100.0
-    imu: Literal["fused", "raw"] = "fused"
+    imu: ImuKind = "fused"
     feet: Literal["mild", "hard"] = "mild"
     left_imu: bool = True
     only: Source | None = None

@@ -1,7 +1,8 @@
 """The parts of the report: which runs each needs, and what it makes of them.
 
 ``tasks``: every task, both feet with IMU, and a smoother as the lower bound. ``technical``: [B]'s bench by the source
-that is left on. ``study``: [B]'s six tasks with the left foot without IMU. ``variants``: 400 Hz, hard feet, raw axes.
+that is left on. ``study``: [B]'s six tasks with the left foot without IMU. ``variants``: 400 Hz, hard feet, raw axes,
+a BNO08x over SHTP.
 ``gaps``: the camera goes dark in a walk. ``covered``: the tags are covered after 3 s, and depth alone shows the shoes.
 """
 
@@ -38,6 +39,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "hard feet": {"feet": "hard"},
     "400 Hz, hard feet": {"imu_hz": 400.0, "feet": "hard"},
     "400 Hz, raw axes": {"imu_hz": 400.0, "imu": "raw"},
+    "400 Hz, BNO08x": {"imu_hz": 400.0, "imu": "bno08x"},
 }
 GAPS_S = (0.5, 1.0, 2.0, 5.0)
 _TECHNICAL_SECONDS = {"still": 60.0}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -16,6 +16,9 @@ from foottrack_service.config import Placement
 from foottrack_service.rotations import Array
 from foottrack_service.simulation import noise
 from foottrack_service.simulation.truth import Track
+
+ImuKind = Literal["fused", "raw", "bno08x"]
+"""What a simulated device sends beside the specific force: its own attitude, a gyro's rate, or both."""
 
 _INNER_HZ = 1600.0  # BMI270 data sheet: highest rate of the accelerometer; lower rates are averages of it
 
@@ -40,6 +43,7 @@ class ImuModel:
     gyro_bias_sd: float
     gyro_instability: float
     gyro_step: float
+    gyro_scale_sd: float = 0.0
     q_step: float = 0.0
     tilt_still_sd: float = 0.0
     """Slow error of the device's own attitude beside what the accelerometer's bias does to it."""
@@ -70,7 +74,14 @@ FUSED = ImuModel(
     tilt_moving_sd=math.radians(1.4),
     yaw_drift=math.radians(0.5) / 60.0,
 )
-"""Fuses on board: sends specific force and its own quaternion, no gyro."""
+"""Fuses on board: sends specific force and its own quaternion, no gyro (ASCII, UART-RVC)."""
+
+BNO08X = replace(
+    FUSED,
+    gyro_bias_sd=math.radians(0.05),  # assumed: what its own zero-rate calibration leaves
+    gyro_scale_sd=0.005,  # two recordings of real walks close with scales that are off by +0.45 and -0.2 %
+)
+"""The same chip over SHTP, which has its calibrated gyro too (data sheet, 2.1.2)."""
 
 RAW = ImuModel(
     # BMI270 data sheet: 160 ug/sqrt(Hz), 0.007 deg/s/sqrt(Hz), zero-g +-20 mg, zero-rate +-0.5 deg/s.
@@ -87,6 +98,7 @@ RAW = ImuModel(
 )
 """Accelerometer and gyro as they are, 16 bits each."""
 
+_MODELS: dict[ImuKind, ImuModel] = {"fused": FUSED, "raw": RAW, "bno08x": BNO08X}
 _INSTABILITY_TAU_S = 100.0
 _STILL_TAU_S, _MOVING_TAU_S = 60.0, 2.0
 _FULL_MOTION = 3.0  # m/s^2 of acceleration, smoothed, at which all of the moving error is there
@@ -144,12 +156,12 @@ def measured(
     place: Placement,
     seconds: float,
     hz: float,
-    kind: Literal["fused", "raw"],
+    kind: ImuKind,
     delay: float,
     random: np.random.Generator,
 ) -> ImuSamples:
     """A run of `seconds`. Stamps are late by `delay` s, as settings have it (`timing.imu_delay`)."""
-    model = FUSED if kind == "fused" else RAW
+    model = _MODELS[kind]
     skew = _SKEW_SD * float(random.standard_normal())
     period = (1.0 + skew) / hz
     t = np.asarray(period * (float(random.random()) + np.arange(math.ceil(seconds / period))), dtype=np.float64)
@@ -169,10 +181,12 @@ def measured(
     gyro_bias = model.gyro_bias_sd * random.standard_normal(3) + noise.gauss_markov(
         random, n, 1.0 / hz, _INSTABILITY_TAU_S, model.gyro_instability
     )
+    if model.gyro_scale_sd > 0.0:
+        rate *= 1.0 + model.gyro_scale_sd * random.standard_normal(3)
     rate = np.clip(rate, -model.gyro_range, model.gyro_range).reshape(n, inner, 3).mean(axis=1) + gyro_bias
     rate += model.gyro_density * bandwidth * random.standard_normal((n, 3))
 
-    q = _own_attitude(track, place, t, hz, acc_bias, model, random) if kind == "fused" else None
+    q = None if kind == "raw" else _own_attitude(track, place, t, hz, acc_bias, model, random)
     begun = int(random.integers(10**6, 10**9))
     t_dev = np.rint(begun + 1e6 * (t - t[:1]) / (1.0 + skew)).astype(np.int64)
     stamps = t + delay + _STAMP_JITTER_SD * random.standard_normal(n)
@@ -182,7 +196,7 @@ def measured(
         t_dev,
         t_arr,
         _quantised(np.clip(acc, -model.acc_range, model.acc_range), model.acc_step),
-        _quantised(rate, model.gyro_step) if kind == "raw" else None,
+        _quantised(rate, model.gyro_step) if kind != "fused" else None,
         q,
     )
     return samples.kept(random.random(n) >= _DROP_SHARE)

@@ -29,6 +29,7 @@ _DEPTH_SCALE_SD = 0.003
 _LENS_PX = 0.5  # px SD of what the lens calibration leaves in the picture's corners, growing with the radius squared
 _FOUND_AT_CELLS, _FOUND_WIDTH = 1.54, 0.20  # blur in cells: of 6 cm tags at 8 px blur 9 % are found, of 10 cm 85 %
 _CELL_PX, _CELL_WIDTH = 2.2, 0.15  # px a cell must have
+_BORDER_PX = 3.0  # OpenCV's detector takes no tag nearer to the border (minDistanceToBorder)
 _MISS_SHARE = 0.01  # nothing in sight explains it
 _FALSE_SHARE = 0.003  # of the pictures, per foot
 _PLAUSIBLE_SHARE = 0.25  # of the false finds have the right size for their distance
@@ -250,7 +251,7 @@ def _found(view: TagView, cells: int, random: np.random.Generator) -> Flags:
     blurred = np.clip((view.blur_px / cell_px - _FOUND_AT_CELLS) / _FOUND_WIDTH, -40.0, 40.0)
     small = np.clip((_CELL_PX - cell_px) / _CELL_WIDTH, -40.0, 40.0)
     chance = (1.0 - _MISS_SHARE) / ((1.0 + np.exp(blurred)) * (1.0 + np.exp(small)))
-    found: Flags = view.inside & ~view.hidden & (random.random(len(chance)) < chance)
+    found: Flags = view.inside & (view.edge_px >= _BORDER_PX) & ~view.hidden & (random.random(len(chance)) < chance)
     return found
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from foottrack_service.simulation.emission import (
 )
 from foottrack_service.simulation.faults import Fault
 from foottrack_service.simulation.footwear import Feet
+from foottrack_service.simulation.imu import ImuKind
 from foottrack_service.simulation.imu import measured as measured_by_imu
 from foottrack_service.simulation.tasks import TASKS, Maker
 from foottrack_service.simulation.truth import BOTH, Truth
@@ -80,7 +80,7 @@ def simulate(
     settings: Settings | None = None,
     seconds: float | None = None,
     imu_hz: float = 100.0,
-    imu: Literal["fused", "raw"] = "fused",
+    imu: ImuKind = "fused",
     feet: Feet = "mild",
     left_imu: bool = True,
     right_imu: bool = True,

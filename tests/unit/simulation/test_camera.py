@@ -154,7 +154,7 @@ def test_blurred_tags_are_missed() -> None:
     def found(blur_px: float, size_px: float) -> float:
         n = 4000
         view = camera.TagView(
-            np.zeros((n, 4, 2)),
+            np.full((n, 4, 2), 100.0),
             np.ones(n),
             np.full(n, size_px),
             np.ones(n, dtype=np.bool_),
@@ -168,6 +168,17 @@ def test_blurred_tags_are_missed() -> None:
     assert found(8.0, 40.0) == pytest.approx(0.85, abs=0.05)
     assert found(0.0, 24.0) > 0.97
     assert found(0.0, 8.0) < 0.02
+
+
+def test_tags_at_the_picture_s_border_are_missed_as_the_detector_misses_them() -> None:
+    n = 100
+    corners = np.full((n, 4, 2), 100.0)
+    corners[n // 2 :, 0, 0] = 2.9
+    none = np.zeros(n, dtype=np.bool_)
+    view = camera.TagView(corners, np.ones(n), np.full(n, 40.0), ~none, none, np.zeros(n))
+    found = optical._found(view, 6, np.random.default_rng(1))
+    assert found[: n // 2].mean() > 0.9
+    assert not found[n // 2 :].any()
 
 
 def test_a_rolling_shutter_sees_each_row_at_its_own_time() -> None:

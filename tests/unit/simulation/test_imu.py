@@ -10,7 +10,7 @@ from foottrack_service import rotations
 from foottrack_service.config import Placement, Settings
 from foottrack_service.rotations import Array
 from foottrack_service.simulation import imu, noise
-from foottrack_service.simulation.imu import FUSED, RAW
+from foottrack_service.simulation.imu import BNO08X, FUSED, RAW
 from foottrack_service.simulation.tasks import TASKS
 from foottrack_service.simulation.truth import Track, grid
 
@@ -124,6 +124,19 @@ def test_a_fused_device_turns_as_the_foot_does() -> None:
     from_start = rotations.angle_between(error[0], error)
     assert np.degrees(from_start).max() < 12.0
     assert np.degrees(from_start).mean() < 3.5
+
+
+def test_a_bno08x_over_shtp_has_the_attitude_and_a_gyro_of_nearly_the_right_scale() -> None:
+    t = grid(20.0)
+    spin = Track(t, np.zeros((len(t), 3)), rotations.from_yaw(2.0 * t))
+    scales = []
+    for seed in range(30):
+        samples = imu.measured(spin, ON_ANKLE, 20.0, 100.0, "bno08x", 0.0, random(seed))
+        assert samples.q is not None
+        assert samples.gyro is not None
+        scales.append(samples.gyro[:, 1].mean() / 2.0)
+    expected = np.hypot(BNO08X.gyro_scale_sd, BNO08X.gyro_bias_sd / 2.0)
+    assert np.std(scales) == pytest.approx(expected, rel=0.35)
 
 
 @pytest.mark.parametrize("kind", ["fused", "raw"])
