@@ -18,7 +18,7 @@ from foottrack_service.bus.endpoints import Context, Socket
 
 FIRST_PATIENCE_S = 0.5
 """A loss that is not followed by an attempt for so long is for good: libzmq announces its own attempts at once."""
-LONGEST_PATIENCE_S = 8.0
+LONGEST_PATIENCE_S = 2.0
 """Who is refused each time asks less and less often."""
 
 _WATCHED = zmq.EVENT_DISCONNECTED | zmq.EVENT_CONNECT_RETRIED | zmq.EVENT_HANDSHAKE_SUCCEEDED

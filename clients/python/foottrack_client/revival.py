@@ -15,7 +15,7 @@ from zmq.utils.monitor import parse_monitor_message
 
 PATIENCE_S = 0.5
 """A loss that is not followed by an attempt for so long is for good; libzmq's attempts are 0.1 s apart."""
-LONGEST_PATIENCE_S = 8.0
+LONGEST_PATIENCE_S = 2.0
 """Who is refused each time asks less and less often."""
 
 _WATCHED = (
