@@ -91,7 +91,7 @@ class Bout:
 
         def at(t: Array) -> Moment:
             since = np.clip(t - self.start, 0.0, walk.duration)
-            foot = walk.targets(since).feet[side]
+            foot = walk.foot(side, since)
             heel = stands(since, [contact.heel for contact in contacts])
             toe = stands(since, [contact.ball for contact in contacts])
             return Moment(stage_place(foot.ankle), foot.yaw, -foot.pitch, heel, toe)
@@ -100,8 +100,8 @@ class Bout:
             self.start,
             self.end,
             _place(prints[-1]),
-            self.start + np.array([float(walk.clock.time(p.strike)) for p in landed]),
-            self.start + np.array([float(walk.clock.time(p.flat)) for p in landed]),
+            self.start + walk.clock.time([p.strike for p in landed]),
+            self.start + walk.clock.time([p.flat for p in landed]),
             at,
         )
 

@@ -89,7 +89,7 @@ def table(figures: dict[str, Any]) -> str:
                 continue
             made = files["generator"]
             lines.append(
-                f"  {path}: generator slip {made['slip_mm']:.6f} mm, yaw {made['yaw_deg']:.6f} deg,"
+                f"  {path}: generator slip {made['slip_mm']:.0e} mm, yaw {made['yaw_deg']:.0e} deg,"
                 f" penetration {made['penetration_mm']:.3f} mm"
             )
             for kind, file in files.items():
@@ -101,7 +101,26 @@ def table(figures: dict[str, Any]) -> str:
                     f" {between['yaw_deg']:.4f} deg, penetration {keys['penetration_mm']:.3f} /"
                     f" {between['penetration_mm']:.3f} mm, round trip {file['round_trip_mm']:.5f} mm"
                 )
-    return "\n".join(lines)
+    return "\n".join([*lines, *_worst(figures)])
+
+
+def _worst(figures: dict[str, Any]) -> list[str]:
+    """The greatest of every figure over all walks, a line for each kind of file."""
+    walks = [files for walk in figures.values() for files in walk["walks"].values() if "error" not in files]
+    if len(walks) < 2:
+        return []
+    lines = [f"worst of these {len(walks)} walks:"]
+    for kind in walks[0]:
+        parts = []
+        for place in ("",) if kind == "generator" else ("keys", "between"):
+            found = [files[kind] if kind == "generator" else files[kind][place] for files in walks]
+            most = {name: max(each[name] for each in found) for name in ("slip_mm", "yaw_deg", "penetration_mm")}
+            parts.append(
+                f"{place} slip {most['slip_mm']:.3g} mm, yaw {most['yaw_deg']:.2g} deg,"
+                f" penetration {most['penetration_mm']:.3f} mm".strip()
+            )
+        lines.append(f"  {kind:9} " + "; ".join(parts))
+    return lines
 
 
 def _file(body: Humanoid, written: Motion, read: Motion, contacts: list[Any]) -> dict[str, Any]:

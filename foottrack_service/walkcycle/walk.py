@@ -117,6 +117,10 @@ class Walk:
         hips[:, 1] = reachable_height(self.body, hips, joints["hips"], ankles, phase)
         return Targets(phase, hips, joints, feet)
 
+    def foot(self, side: str, times: npt.ArrayLike) -> FootTargets:
+        """One foot alone at instants (n,) s."""
+        return self._foot(side, np.atleast_1d(self.clock.phase(times)))
+
     def motion(self, times: npt.ArrayLike) -> Motion:
         """Joint rotations at instants (n,) s."""
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
