@@ -79,6 +79,9 @@ ZERO_GATE = 30.0
 FLOOR_GATE = 12.0
 FLOOR_SIGMA = 0.005
 """m, of a standing ankle's height."""
+FLOOR_UNSEEN, FLOOR_NEAR = 0.006, 0.08
+"""m: a height that is less sure has seen no picture lately, and drift is a likelier reason for being so near to the
+floor than a stair. Held against the height's own sigma: one sample's weight is far less than what a stance is worth."""
 FLOOR_LEAN = 0.9
 """Cosine: a foot that leans more stands on its heel or toes, and the ankle's height says nothing."""
 BIAS_SIGMA = 0.01
@@ -250,10 +253,14 @@ def _inertial_updates(s: Foot, row: Array, x: Array, P: Array, dt: float) -> Non
             up = turned(R, vector(s.foot_up, 0))
             if up[1] > FLOOR_LEAN:
                 r = turned(R, vector(s.ankle_arm, 0))
-                h[:] = 0.0
-                h[1], h[6], h[8] = 1.0, -r[2], r[0]
-                noise = squared(FLOOR_SIGMA + sigma) * 0.1 / dt
-                update1(x, P, h, row[FLOOR] - x[1] - r[1], noise, FLOOR_GATE)
+                off = row[FLOOR] - x[1] - r[1]
+                reach = math.sqrt(FLOOR_GATE * (P[1, 1] + squared(FLOOR_SIGMA + sigma)))
+                if P[1, 1] > FLOOR_UNSEEN**2:
+                    reach = max(reach, FLOOR_NEAR)
+                if abs(off) <= reach:
+                    h[:] = 0.0
+                    h[1], h[6], h[8] = 1.0, -r[2], r[0]
+                    update1(x, P, h, off, squared(FLOOR_SIGMA + sigma) * 0.1 / dt, np.inf)
         if row[QUIET_FLAG] == 1.0 and row[MEAN_RATE] == 0.0:
             for k in range(3):
                 h[:] = 0.0

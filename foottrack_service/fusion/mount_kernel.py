@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from foottrack_service.fusion.compiled import compiled
-from foottrack_service.fusion.foot_filter_kernel import invert3, rotation, turned
+from foottrack_service.fusion.compiled_rotations import quaternion, rotation, turned, vector
+from foottrack_service.fusion.foot_filter_kernel import invert3
 from foottrack_service.rotations import Array
 
 POINT, VALUE, COLUMNS = 7, 10, 11
@@ -22,8 +23,8 @@ def collect(
     comes on top of the covariance. ``weight`` is the picture's; 0.0 adds nothing. Returns the squared Mahalanobis
     distance from what the sums and the 7 ``values`` expect; inf for a covariance that is none.
     """
-    R = rotation(head_q)
-    seen = turned(R, p)
+    R = rotation(quaternion(head_q, 0))
+    seen = turned(R, vector(p, 0))
     A = np.zeros((3, COLUMNS))
     full = np.zeros((3, 3))
     for i in range(3):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from foottrack_service.config import Settings
-from foottrack_service.simulation import bench, people
+from foottrack_service.simulation import bench, people, stairs
 from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.truth import Truth
 
@@ -47,6 +47,7 @@ TASKS: dict[str, Task] = {
         Task("sudden-move", "bench: trackers lie still, then are flicked aside fast", 20.0, bench.sudden_move),
         Task("walk-in-place", "knees up without going anywhere, with pauses", 30.0, people.walk_in_place),
         Task("walk", "a normal walk of 1.27 m/s with stops and turns", 30.0, people.walk),
+        Task("stairs", "up two stairs of 17 cm and down again, backwards, with rests", 30.0, stairs.stairs),
         Task("s-curve", "a normal walk along an S", 20.0, people.s_walk),
     )
 }
