@@ -30,6 +30,7 @@ DARK_GREY = 25.0
 PREVIEW_PERIOD_S = 0.2
 _JUDGE_EVERY = 60
 _NICENESS = 10
+_BELOW_NORMAL_PRIORITY_CLASS = 0x4000
 
 
 @dataclass(frozen=True)
@@ -117,9 +118,7 @@ def work(connection: Connection, settings: dict[str, Any]) -> None:
     """The process's main: until told to stop, the source's end, or an error that is told first."""
     # Ctrl-C reaches every process of the terminal; the node says when it is time.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # A picture may wait, an IMU's sample may not: where cores are few, fusion goes first.
-    if sys.platform != "win32":
-        os.nice(_NICENESS)
+    _yield_to_others()
     # Pictures come one by one: OpenCV's threads would only take the other core from fusion.
     cv2.setNumThreads(1)
     source: Source | None = None
@@ -152,6 +151,18 @@ def work(connection: Connection, settings: dict[str, Any]) -> None:
         if source is not None:
             source.close()
         connection.close()
+
+
+def _yield_to_others() -> None:
+    """A picture may wait, an IMU's sample may not: where cores are few, fusion goes first."""
+    if sys.platform == "win32":
+        import ctypes
+
+        kernel = ctypes.windll.kernel32
+        kernel.GetCurrentProcess.restype = ctypes.c_void_p
+        kernel.SetPriorityClass(ctypes.c_void_p(kernel.GetCurrentProcess()), _BELOW_NORMAL_PRIORITY_CLASS)
+    else:
+        os.nice(_NICENESS)
 
 
 def _tell(connection: Connection, ended: Ended) -> None:

@@ -187,9 +187,7 @@ class _Wearer:
 
 
 def _draw(folder: Path) -> None:
-    """A standing person's pictures in TUM's layout, without compression: decoding is not what is measured."""
-    import cv2
-
+    """A standing person's pictures in TUM's layout, as arrays to map: handing them over is not what is measured."""
     from foottrack_service.camera.setup import open_source
 
     task = {"task": "still", "seed": 1, "seconds": 60.0, "fps": FPS, "start": 0, "readout": 0.0}
@@ -197,10 +195,9 @@ def _draw(folder: Path) -> None:
     lists: dict[str, list[str]] = {"rgb": [], "depth": []}
     for number in range(_PICTURES):
         frame = source.read()
-        for kind, picture in (("rgb", frame.gray), ("depth", frame.depth)):
-            name = f"{kind}-{number:04d}.png"
-            if picture is None or not cv2.imwrite(str(folder / name), picture, [cv2.IMWRITE_PNG_COMPRESSION, 0]):
-                raise CommandFailed(f"{folder / name} cannot be written")
+        for kind, picture in (("rgb", frame.gray), ("depth", np.asarray(frame.depth))):
+            name = f"{kind}-{number:04d}.npy"
+            np.save(folder / name, picture)
             lists[kind].append(f"{number / FPS:.6f} {name}")
     for kind, lines in lists.items():
         (folder / f"{kind}.txt").write_text("\n".join(lines), encoding="utf-8")

@@ -1,7 +1,8 @@
 """A recorded RGB-D sequence in the layout of TUM's RGB-D benchmark (Sturm et al., IROS 2012).
 
 ``rgb.txt`` and ``depth.txt`` list ``timestamp path`` a line, ``#`` begins a comment; depth pictures are 16 bit, one
-metre is 5000. Colour and depth that are at most 20 ms apart belong together.
+metre is 5000. Colour and depth that are at most 20 ms apart belong together. A picture may also be an array in numpy's
+format (``.npy``), which is mapped into memory: it needs no decoding.
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ import time
 from bisect import bisect_left
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from foottrack_service.camera.frame import DepthMap, Frame, SourceEnded, SourceError
 from foottrack_service.camera.rig import Intrinsics
@@ -50,8 +53,8 @@ class FolderSource:
         stamp, name = self._colour[index]
         number, self._next = self._next, self._next + 1
         t = round((stamp + round_trip * self._duration()) * 1e9) + self._shift
-        gray = cv2.imread(str(self._path / name), cv2.IMREAD_GRAYSCALE)
-        if gray is None:
+        gray = _pixels(self._path / name, cv2.IMREAD_GRAYSCALE)
+        if gray is None or gray.dtype != np.uint8 or gray.ndim != 2:
             raise SourceError(f"{self._path / name} is no picture")
         if gray.shape != (self.intrinsics.height, self.intrinsics.width):
             size = f"{gray.shape[1]}x{gray.shape[0]}"
@@ -74,10 +77,19 @@ class FolderSource:
         near = min(self._depth[max(at - 1, 0) : at + 1], key=lambda entry: abs(entry[0] - stamp), default=None)
         if near is None or abs(near[0] - stamp) > _TOGETHER_S:
             return None
-        depth = cv2.imread(str(self._path / near[1]), cv2.IMREAD_UNCHANGED)
+        depth = _pixels(self._path / near[1], cv2.IMREAD_UNCHANGED)
         if depth is None or depth.dtype != np.uint16 or depth.ndim != 2:
             raise SourceError(f"{self._path / near[1]} is no 16 bit depth picture")
         return np.asarray(depth, np.uint16)
+
+
+def _pixels(path: Path, mode: int) -> npt.NDArray[Any] | None:
+    if path.suffix != ".npy":
+        return cv2.imread(str(path), mode)
+    try:
+        return np.asarray(np.load(path, mmap_mode="r"))
+    except (OSError, ValueError):
+        return None
 
 
 def _read_list(path: Path) -> list[tuple[float, str]]:

@@ -65,6 +65,22 @@ def test_a_folder_gives_pictures_depth_and_stamps(sequence: Path) -> None:
     assert len(fixes) == 1 and fixes[0].size_ratio == pytest.approx(1.0, abs=0.08)
 
 
+def test_arrays_are_mapped_instead_of_decoded(sequence: Path) -> None:
+    decoded = read_all(FolderSource(sequence, LENS, 0.003))
+    for list_name in ("rgb.txt", "depth.txt"):
+        (sequence / list_name).write_text((sequence / list_name).read_text().replace(".png", ".npy"))
+    for path in sequence.glob("*.png"):
+        np.save(path.with_suffix(".npy"), cv2.imread(str(path), cv2.IMREAD_UNCHANGED))
+    mapped = read_all(FolderSource(sequence, LENS, 0.003))
+    for one, other in zip(decoded, mapped, strict=True):
+        np.testing.assert_array_equal(one.gray, other.gray)
+        np.testing.assert_array_equal(np.asarray(one.depth), np.asarray(other.depth))
+    for wrong in (b"no array", (sequence / "d0.npy").read_bytes()):
+        (sequence / "c0.npy").write_bytes(wrong)
+        with pytest.raises(SourceError, match="is no picture"):
+            FolderSource(sequence, LENS, 0.003).read()
+
+
 def test_a_folder_can_play_from_now_on_in_its_own_time(sequence: Path) -> None:
     start = 5_000_000_000
     source = FolderSource(sequence, LENS, 0.003, now=lambda: start + 10**9, loop=True)
