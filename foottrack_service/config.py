@@ -121,7 +121,9 @@ class CameraSettings(Section):
         description="camera (-Z into the picture, +Y up) to head: 20 deg down",
     )
     dictionary: str | Annotated[tuple[str, ...], Field(min_length=1)] = Field(
-        default="DICT_4X4_50", description="OpenCV's name, GENERATED_3X3_4, or the tags' cells as strings of 0 and 1"
+        default="DICT_4X4_50",
+        description="OpenCV's name, GENERATED_3X3_4 (found in more blur, and where there is none in 0.3 % of windows), "
+        "or the tags' cells as strings of 0 and 1",
     )
     targets: TargetsSettings = TargetsSettings()
     source: SourceSettings = SourceSettings()

@@ -31,8 +31,9 @@ class Chessboard:
     """`columns` x `rows` *inner* corners, squares of `square` m.
 
     `refine_px` is half the side of the neighbourhood in which a corner is refined. None takes 0.4 of the least distance
-    between corners, 11 at most: a fixed 11, as in OpenCV's own example, reaches the next corner in slanted views (on
-    its 13 photos 0.41 px rms instead of 0.18, and a focal length 0.5 % longer).
+    between corners, 11 at most. A fixed 11, as in OpenCV's own example, reaches other corners in slanted views: on its
+    13 photos 0.41 px rms and fx 536.1, as it publishes, instead of 0.18 and 533.3, all by one view that then misses by
+    1.2 px. On drawn views of a known lens 0.4 finds fx within 0.2 px, 0.55 misses by up to 12, and 11 has 1.1 px rms.
     """
 
     columns: int

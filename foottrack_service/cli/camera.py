@@ -97,7 +97,13 @@ def calibrate_camera(
     dictionary: Annotated[str, typer.Option("--dictionary", help="charuco: its tags.")] = "DICT_4X4_50",
     views: Annotated[int, typer.Option("--views", min=8, help="Live: how many to collect.")] = 20,
     max_rms: Annotated[float, typer.Option("--max-rms", help="Refuse a fit that is worse, px.")] = 0.8,
-    refine: Annotated[int | None, typer.Option("--refine", help="chessboard: corner neighbourhood, px.")] = None,
+    refine: Annotated[
+        int | None,
+        typer.Option(
+            "--refine",
+            help="chessboard: corner neighbourhood, px; 0.4 of the least spacing if absent, 11 as OpenCV does it.",
+        ),
+    ] = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
 ) -> None:

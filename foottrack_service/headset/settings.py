@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from foottrack_protocol.messages import Quat, Vec3
 from foottrack_service.section import Section
@@ -55,6 +55,13 @@ class OpenXrSettings(Section):
 
 class HeadsetSettings(Section):
     """Where the head's pose comes from."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _camera_is_elsewhere(cls, values: Any) -> Any:
+        if isinstance(values, dict) and "camera" in values:
+            raise ValueError("where the camera sits on the headset is [camera] mount = { p = [...], q = [...] }")
+        return values
 
     source: Literal["bus", "vmc", "openvr", "openxr"] = Field(
         default="bus", description="bus: an engine publishes head/pose, or nobody does"

@@ -110,3 +110,9 @@ def test_no_address_is_refused(where):
 def test_a_mount_s_hash_changes_with_the_mount():
     moved = Settings(camera={"mount": {"p": [0.0, 0.01, -0.08]}})
     assert moved.camera.mount_hash != Settings().camera.mount_hash
+
+
+def test_a_mount_under_headset_is_told_its_place(tmp_path):
+    file = write(tmp_path, "[headset.camera]\np = [0.0, 0.0, -0.08]\n")
+    with pytest.raises(ConfigError, match=r"where the camera sits on the headset is \[camera\] mount"):
+        config.load(file)

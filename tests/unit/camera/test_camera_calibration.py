@@ -94,6 +94,55 @@ def test_boards_are_found_in_pictures_of_them() -> None:
     np.testing.assert_allclose(steps, 30.0, atol=0.1)
 
 
+def photo(R: np.ndarray, place: np.ndarray, noise: np.random.Generator) -> np.ndarray:
+    """A 10 x 7 board of 25 mm as LENS sees it: each pixel's ray is followed to the board, four to a pixel."""
+    squares = np.pad(
+        np.kron(np.indices((7, 10)).sum(axis=0) % 2, np.ones((40, 40))) * 190 + 35, 40, constant_values=225
+    )
+    u, v = np.meshgrid(np.arange(1280) / 2 - 0.25, np.arange(960) / 2 - 0.25)
+    rays = LENS.rays(np.stack([u.ravel(), v.ravel()], axis=1))
+    along = np.column_stack([rays, np.ones(len(rays))]) @ R
+    eye = -R.T @ place
+    x, y = (eye[i] - eye[2] / along[:, 2] * along[:, i] for i in (0, 1))
+    at = [((w / 0.025 + 2.0) * 40 - 0.5).reshape(960, 1280).astype(np.float32) for w in (x, y)]
+    drawn = cv2.remap(squares.astype(np.uint8), *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=110)
+    small = cv2.resize(drawn, (640, 480), interpolation=cv2.INTER_AREA)
+    return np.clip(cv2.GaussianBlur(small, (0, 0), 0.6) + noise.normal(0.0, 2.0, small.shape), 0, 255).astype(np.uint8)
+
+
+def test_corners_are_refined_where_no_other_corner_reaches() -> None:
+    source = np.random.default_rng(5)
+    pictures: list[np.ndarray] = []
+    model = GRID - GRID[0]
+    outline = np.array([[x, y, 0.0] for x in (-0.05, 0.25) for y in (-0.05, 0.175)])
+    while len(pictures) < 10:
+        R = rotations.to_matrix(rotations.from_rotation_vector(source.uniform(-0.75, 0.75, 3) * [1.0, 1.0, 0.5]))
+        place = np.array([*source.uniform((-0.2, -0.15), (0.2, 0.15)), source.uniform(0.4, 0.62)]) - R @ [
+            0.1,
+            0.0625,
+            0,
+        ]
+        pixels = LENS.project(outline @ R.T + place)
+        if pixels.min() > 0 and pixels[:, 0].max() < 640 and pixels[:, 1].max() < 480:
+            pictures.append(photo(R, place, source))
+    errors = {}
+    for refine in (None, 11):
+        seen = [view for view in (Chessboard(9, 6, 0.025, refine).find(picture) for picture in pictures) if view]
+        np.testing.assert_allclose(seen[0].model, model, atol=1e-12)
+        flat, image = [view.model for view in seen], [view.image for view in seen]
+        rms, matrix, *_ = cv2.calibrateCamera(
+            [f.astype(np.float32) for f in flat],
+            [i.astype(np.float32) for i in image],
+            (640, 480),
+            np.eye(3),
+            np.zeros(5),
+        )
+        errors[refine] = (rms, abs(matrix[0, 0] - LENS.fx))
+    assert errors[None][0] < 0.1 and errors[None][1] < 1.0
+    # OpenCV's own example refines within 11 px, whatever the distance of the next corner.
+    assert errors[11][0] > 3.0 * errors[None][0] and errors[11][1] > errors[None][1]
+
+
 def test_the_floor_is_found_under_feet_and_calibrates_its_height() -> None:
     made = world(looking_down(), {"left": stepping(-0.1, 0.0), "right": stepping(0.1, 0.5)})
     planes, heads, last = [], [], None
