@@ -20,6 +20,7 @@ from foottrack_service.recording.reader import read
 from foottrack_service.walkcycle.cycle import build_cycle
 from foottrack_service.walkcycle.path import parse_path
 from foottrack_service.walkcycle.presets import preset
+from foottrack_service.walkcycle.report import measure_all, table
 from foottrack_service.walkcycle.walk import walk_along
 
 
@@ -192,3 +193,12 @@ def test_measure_reports_figures_as_one_object() -> None:
     assert walk["glb_60"]["between"]["slip_mm"] < 0.5
     assert walk["bvh_60"]["round_trip_mm"] < 0.01
     assert "line:3" in run_walk("measure", "normative", "--path", "line:3").stdout
+
+
+def test_the_table_ends_with_the_worst_of_all_walks() -> None:
+    figures = measure_all([preset("sneak"), preset("normative")], ["line:2", "line:0.1"])
+    assert "shorter" in figures["sneak"]["walks"]["line:0.1"]["error"]
+    lines = table(figures).splitlines()
+    worst = lines.index("worst of these 2 walks:")
+    most = max(figures[name]["walks"]["line:2"]["bvh_30"]["between"]["slip_mm"] for name in figures)
+    assert any(line.split()[0] == "bvh_30" and f"between slip {most:.3g} mm" in line for line in lines[worst + 1 :])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import find_peaks
 
+from foottrack_service.walkcycle.curves import at_rest
 from foottrack_service.walkcycle.cycle import build_cycle
 from foottrack_service.walkcycle.errors import ProjectError
 from foottrack_service.walkcycle.inplace import arc, in_place, self_crossings
@@ -20,7 +21,7 @@ from foottrack_service.walkcycle.reference import (
     step_offsets_as_printed,
 )
 from foottrack_service.walkcycle.report import angle_rms, cycle_closure
-from foottrack_service.walkcycle.skeleton import INDEX, Humanoid, forward_kinematics
+from foottrack_service.walkcycle.skeleton import INDEX, Humanoid, Measures, forward_kinematics
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -117,6 +118,42 @@ def test_sneaking_lands_on_the_toes() -> None:
     points = foot_points(cycle.body, in_place(cycle, [0.0]))["left"]
     assert points.heel[0, 1] > 0.02
     assert points.ball[0, 1] == pytest.approx(cycle.body.ball_height, abs=1e-9)
+
+
+@pytest.mark.parametrize("between", [2, 3, 6, 11])
+def test_a_curve_at_rest_leaves_and_arrives_gently_and_passes_its_keys(between: int) -> None:
+    phases = np.linspace(0.6, 1.0, between + 2)
+    values = 0.5 - 0.5 * np.cos((phases - 0.6) / 0.4 * np.pi)
+    curve = at_rest(phases, values)
+    assert curve(phases) == pytest.approx(values, abs=5e-3)
+    assert curve(np.array([0.0, 2.0])) == pytest.approx([0.0, 1.0])
+    h = 1e-4
+    for end, inwards in ((0.6, 1.0), (1.0, -1.0)):
+        first, second, third = curve(end + inwards * h * np.arange(3.0))
+        assert abs(second - first) / h < 1e-3
+        assert abs(third - 2.0 * second + first) / h**2 < 1.0
+    steps = np.diff(curve(np.linspace(0.6, 1.0, 400)))
+    assert steps.min() > -1e-6, "it overshoots nowhere"
+
+
+def test_a_body_with_measures_of_its_own_stands_on_its_own_feet() -> None:
+    known = Measures(
+        thigh=0.5, shank=0.4, hip_width=0.2, torso=0.6, ankle_height=0.11, heel_behind=0.06, ball_ahead=0.15
+    )
+    body = Humanoid(1.8, known)
+    rest = np.tile([0.0, 0.0, 0.0, 1.0], (1, 22, 1))
+    places, _ = forward_kinematics(body.offsets, body.offsets[:1], rest)
+    at = {name: places[0, index] for name, index in INDEX.items()}
+    assert at["hips"] == pytest.approx([0.0, 1.01, 0.0])
+    assert at["head"][1] == pytest.approx(1.61)
+    assert at["leftFoot"] == pytest.approx([0.1, 0.11, 0.0])
+    assert at["rightFoot"] == pytest.approx([-0.1, 0.11, 0.0])
+    assert at["leftToes"] == pytest.approx([0.1, body.ball_height, 0.15])
+    assert body.heel == pytest.approx([0.0, -0.11, -0.06])
+    # In proportion, nothing changes.
+    alike = Humanoid(1.8)
+    same = Measures(alike.thigh, alike.shank, ankle_height=alike.ankle_height, ball_ahead=float(alike.ball[2]))
+    assert Humanoid(1.8, same).offsets == pytest.approx(alike.offsets)
 
 
 def test_heels_rise_and_toes_roll() -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
+from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ import pytest
 from foottrack_service.walkcycle.cycle import build_cycle
 from foottrack_service.walkcycle.errors import PathError
 from foottrack_service.walkcycle.footprints import plan_walk
-from foottrack_service.walkcycle.path import circle, line, parse_path, polyline, s_curve, spline
+from foottrack_service.walkcycle.measure import measure_slip
+from foottrack_service.walkcycle.path import Path, circle, line, parse_path, polyline, s_curve, spline
 from foottrack_service.walkcycle.presets import preset
 from foottrack_service.walkcycle.timing import make_clock
 from foottrack_service.walkcycle.walk import walk_along, walk_for
@@ -53,7 +55,7 @@ def test_one_may_turn_back_on_the_spot() -> None:
     assert np.all(np.isfinite(walk.motion(walk.times(60.0)).rotations))
 
 
-def test_files_of_points(tmp_path: Path) -> None:
+def test_files_of_points(tmp_path: FilePath) -> None:
     file = tmp_path / "way.json"
     file.write_text('{"kind": "spline", "points": [[0, 0], [0.5, 2], [0, 4]]}')
     assert parse_path(str(file)).length > 4.0
@@ -91,7 +93,7 @@ def test_bad_paths_name_what_is_wrong(text: str, named: str) -> None:
         ("7", "points"),
     ],
 )
-def test_bad_path_files_name_the_place(tmp_path: Path, content: str, named: str) -> None:
+def test_bad_path_files_name_the_place(tmp_path: FilePath, content: str, named: str) -> None:
     file = tmp_path / "bad.json"
     file.write_text(content)
     with pytest.raises(PathError) as error:
@@ -118,6 +120,38 @@ def test_footprints_alternate_and_lie_beside_the_path() -> None:
         assert np.hypot(places[:, 0] - 3.0, places[:, 1]) == pytest.approx(np.full(len(places), radius), abs=1e-6)
     order = sorted((p.strike, p.side) for side in plan.footprints.values() for p in side if np.isfinite(p.strike))
     assert all(a[1] != b[1] for a, b in pairwise(order))
+
+
+@pytest.mark.parametrize("path", [line(4.0, 30.0), circle(1.0, -180.0), s_curve(6.0)])
+@pytest.mark.parametrize("left", [-0.11, 0.0, 0.2])
+def test_a_point_beside_a_path_is_found_on_it_wherever_the_path_begins(path: Path, left: float) -> None:
+    there = path.moved((2.0, -1.0), 2.5)
+    assert there.place(np.zeros(1))[0] == pytest.approx([2.0, -1.0])
+    assert float(there.heading(np.zeros(1))[0]) == pytest.approx(float(path.heading(np.zeros(1))[0]) + 2.5)
+    for arc in (-0.05, 0.0, 0.4):
+        x, z = there.offset(np.array([arc]), left)[0]
+        assert there.project((float(x), float(z))) == (pytest.approx(arc, abs=1e-9), pytest.approx(left, abs=1e-9))
+
+
+def test_a_moved_footprint_lies_beside_itself_on_the_path() -> None:
+    path = circle(2.0)
+    print_ = plan_walk(build_cycle(preset("normative")), path).footprints["left"][2]
+    moved = print_.moved(path, ahead=0.1, left=0.05, turn=0.02)
+    assert np.hypot(moved.place[0] - 2.0, moved.place[1]) == pytest.approx(2.0 - print_.aside - 0.05)
+    assert moved.yaw - print_.yaw == pytest.approx(0.1 / 2.0 + 0.02)
+    assert path.project(moved.place, near=moved.arc) == (pytest.approx(moved.arc), pytest.approx(moved.aside))
+
+
+def test_footprints_moved_about_slip_no_more() -> None:
+    walk = walk_along(build_cycle(preset("normative")), s_curve(6.0))
+    feet = {
+        side: [p.moved(walk.path, 0.01 * (-1) ** i, 0.02 * (i % 3 - 1), 0.03 * (-1) ** i) for i, p in enumerate(prints)]
+        for side, prints in walk.plan.footprints.items()
+    }
+    walk = replace(walk, plan=replace(walk.plan, footprints=feet))
+    slip = measure_slip(walk.body, walk.motion(walk.times(240.0)), walk.contacts)
+    assert (slip.point_mm, slip.yaw_deg) == (pytest.approx(0.0, abs=1e-6), pytest.approx(0.0, abs=1e-6))
+    assert slip.penetration_mm < 0.5
 
 
 def test_the_last_steps_end_at_the_paths_end() -> None:
