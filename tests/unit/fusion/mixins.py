@@ -10,9 +10,15 @@ import pytest
 from foot_runs import START, Run, remember, run
 
 from foottrack_service import rotations as rot
+from foottrack_service.config import Settings
+from foottrack_service.evaluation.run import run_filter
 from foottrack_service.fusion.interface import FootFilter, HeadSample, ImuSample, OpticalFix
 from foottrack_service.simulation import faults as f
+from foottrack_service.simulation import people
+from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.scenario import Scenario, simulate
+from foottrack_service.simulation.stride import CAUTIOUS, Planner
+from foottrack_service.simulation.truth import Truth
 
 FROM, TO = 3.0, 4.0
 """s: when faults begin and end."""
@@ -40,17 +46,41 @@ FAULTS: dict[str, tuple[f.Fault, ...]] = {
 
 
 @cache
-def scenario(task: str, fault: str | None, hz: float = 200.0, kind: str = "fused") -> Scenario:
-    """A short run of a task with a fault of FAULTS."""
+def scenario(task: str, fault: str | None, hz: float = 200.0, kind: str = "fused", left_imu: bool = True) -> Scenario:
+    """A short run of a task, or of the half turn, with a fault of FAULTS."""
     faults = FAULTS[fault] if fault else ()
-    return remember(simulate(task, 11, seconds=LENGTH, imu_hz=hz, imu=kind, faults=faults, start=START), faults)
+    motion = _half_turn if task == "half turn" else None
+    made = simulate(
+        task,
+        11,
+        seconds=LENGTH,
+        imu_hz=hz,
+        imu=kind,
+        left_imu=left_imu,
+        faults=faults,
+        start=START,
+        motion=motion,
+    )
+    return remember(made, faults)
+
+
+def _half_turn(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
+    """Half a turn to the left on the spot."""
+    plan = Planner(random)
+    plan.turn(np.pi, CAUTIOUS, 0.45)
+    return people.scene(seconds, settings, feet, random, plan, people.Bearing())
 
 
 class FiniteMixin:
     """No number that is none gets out, nothing is raised, whatever comes in."""
 
     believes_numbers = False
-    """Whether it relies on the codec to keep NaN away."""
+    """Whether it relies on the codec and on the core to keep NaN away; then that is what is tested."""
+    settings = Settings()
+    """With which the core makes this filter."""
+    left_imu = True
+    after_a_turn = (0.015, 0.06)
+    """m and rad, half a second after a turn on the spot."""
 
     def make(self) -> FootFilter:
         """A new left foot's filter with default settings."""
@@ -61,15 +91,37 @@ class FiniteMixin:
 
     @pytest.mark.parametrize("fault", FAULTS)
     def test_stays_finite(self, fault: str) -> None:
+        faulty = scenario("tracker-moving", fault, left_imu=self.left_imu)
         if fault == "NaN" and self.believes_numbers:
-            pytest.skip("the codec and the fusion core guard this filter")
-        found = run(self.make, scenario("tracker-moving", fault))
+            _assert_the_core_guards(self.settings, faulty)
+            return
+        found = run(self.make, faulty)
         assert len(found.t) > 300
         _assert_sound(found)
 
     def test_standing_still(self) -> None:
-        still = scenario("still", None)
+        still = scenario("still", None, left_imu=self.left_imu)
         assert np.median(run(self.make, still).errors(still, "left", 1.0)) < 0.02
+
+    def test_a_half_turn(self) -> None:
+        turning = scenario("half turn", None, left_imu=self.left_imu)
+        found = run(self.make, turning)
+        _assert_sound(found)
+        late = [i for i, t in enumerate(found.t) if t > LENGTH - 0.4]
+        assert found.errors(turning, "left", LENGTH - 0.4).max() < self.after_a_turn[0]
+        _, true = turning.truth.feet["left"].pose(np.array(found.t)[late])
+        ours = np.array([found.estimates[i].q for i in late])
+        assert float(np.max(rot.angle_between(ours, true))) < self.after_a_turn[1]
+
+    def test_a_sudden_brake(self) -> None:
+        flicked = scenario("sudden-move", None, left_imu=self.left_imu)
+        found = run(self.make, flicked)
+        _assert_sound(found)
+        t = np.array(found.t)
+        speed = np.linalg.norm(flicked.truth.feet["left"].velocity(t), axis=1)
+        stood = np.array([(speed[(t > moment - 0.5) & (t <= moment)] < 0.01).all() for moment in t])
+        assert (speed > 1.0).any() and (stood & (t > 3.0)).any()
+        assert found.errors(flicked, "left")[stood & (t > 1.0)].max() < 0.02
 
     @pytest.mark.parametrize("t", [0, -(2**62), 2**62])
     def test_any_stamp(self, t: int) -> None:
@@ -146,6 +198,14 @@ class RecoveryMixin(FiniteMixin):
 
 def _heads(fix: OpticalFix) -> tuple[HeadSample, HeadSample]:
     return fix.head, fix.head_at_arrival
+
+
+def _assert_the_core_guards(settings: Settings, faulty: Scenario) -> None:
+    runs, core = run_filter(faulty.messages(), settings)
+    assert core.health["user/left"].rejected["not_finite"] > 0
+    for run_ in runs.values():
+        assert len(run_.t) > 300
+        assert np.isfinite(run_.p).all() and np.isfinite(run_.q).all() and np.isfinite(run_.sigma).all()
 
 
 def _assert_sound(found: Run) -> None:

@@ -8,7 +8,7 @@ from foot_runs import START, run
 from mixins import FROM, TO, FiniteMixin, RecoveryMixin, scenario
 
 from foottrack_protocol.frames import SIDES
-from foottrack_service.config import FootSettings
+from foottrack_service.config import FootSettings, FusionSettings, Settings
 from foottrack_service.fusion.foot_filter import ErrorStateFilter
 from foottrack_service.fusion.interface import FootFilter, ImuSample
 from foottrack_service.fusion.reference import ReferenceFilter
@@ -20,8 +20,20 @@ class TestErrorState(RecoveryMixin):
         return ErrorStateFilter(FootSettings(), "left")
 
 
+class TestPicturesAlone(FiniteMixin):
+    """A foot without an IMU."""
+
+    left_imu = False
+    after_a_turn = (0.03, 0.15)
+
+    def make(self) -> FootFilter:
+        return ErrorStateFilter(FootSettings(), "left")
+
+
 class TestReference(FiniteMixin):
     believes_numbers = True
+    settings = Settings(fusion=FusionSettings(filter="reference"))
+    after_a_turn = (0.3, 0.6)
 
     def make(self) -> FootFilter:
         return ReferenceFilter(FootSettings(), "left")
