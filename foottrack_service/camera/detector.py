@@ -50,7 +50,7 @@ class TagDetector:
 
     def __init__(self, dictionary: Any, ids: Iterable[int]) -> None:
         self._ids = frozenset(ids)
-        self._whole, self._narrow = _parameters(), _parameters()
+        self._whole, self._narrow = _parameters(0.3), _parameters(0.45)
         # Twice OpenCV's samples a cell, and all the correction the dictionary allows: a 3x3 tag of 6 cm at 1.5 m
         # with 8 px of blur is then found in 90 % instead of 47 %, a 4x4 in 25 % instead of 3 %. In a window where
         # one of few ids is expected, that is safe; in the whole picture it would not be.
@@ -98,12 +98,12 @@ class TagDetector:
         return list(largest.values())
 
 
-def _parameters() -> Any:
+def _parameters(neighbourhood: float) -> Any:
     """OpenCV's defaults, with corners of the tags that were recognised (no candidate's) refined to sub-pixel."""
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    # Half a cell at most: a neighbourhood that holds nothing but the corner itself.
-    parameters.relativeCornerRefinmentWinSize = 0.45
+    # Half the side of a corner's neighbourhood over a cell's: nothing but the corner itself may be in it.
+    parameters.relativeCornerRefinmentWinSize = neighbourhood
     parameters.cornerRefinementWinSize = 5
     parameters.cornerRefinementMinAccuracy = 0.01
     return parameters
