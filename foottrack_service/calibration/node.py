@@ -44,7 +44,7 @@ class CalibrationDesk:
         self._bus, self._settings, self._store = bus, settings, store
         self._publisher = bus.publisher(SOURCE)
         self._known: dict[str, Any] = {}
-        self._busy = False
+        self._under_way: Flow | None = None
 
     @property
     def handlers(self) -> dict[str, Callable[..., Any]]:
@@ -104,16 +104,18 @@ class CalibrationDesk:
     async def _run(self, user: str | None, make: Callable[[], Flow]) -> Any:
         if user is not None and user != self._settings.user:
             raise ControlError(Code.UNAVAILABLE, f"this service is {self._settings.user!r}'s, not {user!r}'s")
-        if self._busy:
-            raise ControlError(Code.BUSY, "a calibration is under way already")
-        self._busy = True
+        if self._under_way is not None:
+            # Also one that nobody waits for any more: whoever gave up should know when to try again.
+            most = self._under_way.ready_to_wait_s
+            raise ControlError(Code.BUSY, f"a calibration is under way already, and ends within {most:g} s")
+        self._recall()
+        self._under_way = make()
         try:
-            self._recall()
-            found = await self._watch(make())
+            found = await self._watch(self._under_way)
         except Refused as refused:
             raise ControlError(refused.code, refused.message) from None
         finally:
-            self._busy = False
+            self._under_way = None
         self._known[_name(found)] = found
         self._publish(found)
         self._keep(found)
