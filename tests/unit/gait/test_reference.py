@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, lfilter_zi
-from walkers import ANKLE, SHOE, WEARER, feed, marching
+from walkers import ANKLE, HZ, SHOE, WEARER, feed, marching
 
 from foottrack_service.gait import reference_equations as eq
 from foottrack_service.gait.foot_phases import FootPhases
@@ -90,6 +90,15 @@ def test_defect_equation_3_overshoots_where_the_machine_freezes_it():
     assert frozen - next_support == pytest.approx(0.130, abs=0.001)
 
 
+@pytest.mark.parametrize(("lerp", "least"), [(False, 0.06), (True, 0.015)])
+def test_defect_of_equation_3_shows_at_the_next_step(lerp, least):
+    """The foot that was frozen ahead jumps back when the other one is seen to rise."""
+    _, outs = reference(1.2, 0.28, lerp=lerp)
+    z, right = forward(outs), [out.state.right.phase for _, out in outs]
+    back = [k for k in range(2 * HZ, 6 * HZ) if right[k] == "ascending" and z[k] - z[k + 7] > least]
+    assert back
+
+
 @pytest.mark.parametrize("lerp", [False, True])
 def test_defect_low_steps_are_never_seen(lerp):
     gait, outs = reference(1.5, 0.095, lerp=lerp)
@@ -100,9 +109,32 @@ def test_defect_low_steps_are_never_seen(lerp):
     assert gait.legs.steps >= 9
 
 
-def test_defect_a_lift_is_seen_late():
+@pytest.mark.parametrize("lerp", [False, True])
+def test_defect_of_41_steps_of_10_cm_it_sees_less_than_half(lerp):
+    """The threshold is the peak, and the smoothed height stays below it (known: 17 of 41; these rounder swings: none).
+
+    Nearly all of the same steps are seen when they are 16 cm high.
+    """
+    left, right = marching(1.2, 0.1, 1.0 + 41.5 / 1.2)
+    peaks = 0.10 * (1.0 + 0.08 * np.random.default_rng(3).standard_normal(41))
+    for feet, first in ((left, 0), (right, 1)):
+        feet.peaks = peaks[first::2].tolist()
+    assert len(left.begins) + len(right.begins) == 41
+    gait = Gait(WEARER, GaitSettings(mode="reference", lerp=lerp))
+    outs = feed(gait, left, right, 38.0)
+    assert outs[-1][1].state.steps == 41
+    assert gait.legs.steps <= 17
+    for foot in (left, right):
+        foot.peaks = [1.6 * peak for peak in foot.peaks]
+    gait = Gait(WEARER, GaitSettings(mode="reference", lerp=lerp))
+    feed(gait, left, right, 38.0)
+    assert gait.legs.steps >= 35
+
+
+@pytest.mark.parametrize("lerp", [False, True])
+def test_defect_a_lift_is_seen_late(lerp):
     left, right = marching(1.0, 0.15, 6.0)
-    gait = Gait(WEARER, GaitSettings(mode="reference"))
+    gait = Gait(WEARER, GaitSettings(mode="reference", lerp=lerp))
     rose = []
     for k in range(1200):
         t = k / 200
@@ -113,8 +145,9 @@ def test_defect_a_lift_is_seen_late():
     assert len(delays) >= 2 and min(delays) > 0.2
 
 
-def test_defect_planted_feet_skate():
-    _, outs = reference(1.6, 0.28, seconds=8.0)
+@pytest.mark.parametrize("lerp", [False, True])
+def test_defect_planted_feet_skate(lerp):
+    _, outs = reference(1.6, 0.28, seconds=8.0, lerp=lerp)
     t = np.array([t for t, _ in outs])
     speed = np.array([out.ik.speed for _, out in outs])
     world = np.concatenate([[0.0], np.cumsum(speed[1:] * np.diff(t))]) + forward(outs)

@@ -20,12 +20,12 @@ class Foot:
     """
 
     def __init__(self, x, begins, swing, peak, shift=0.0, turn=0.0):
-        self.x, self.begins, self.swing, self.peak, self.shift = x, list(begins), swing, peak, shift
-        self.turns = [turn] * len(self.begins)
+        self.x, self.begins, self.swing, self.shift = x, list(begins), swing, shift
+        self.turns, self.peaks = [turn] * len(self.begins), [peak] * len(self.begins)
 
     def height(self, t):
         share = self._share(t)
-        return self.peak * math.sin(math.pi * share) ** 2
+        return self._peak(t) * math.sin(math.pi * share) ** 2
 
     def sample(self, t):
         share, done = self._share(t), sum(begin + self.swing <= t for begin in self.begins)
@@ -33,11 +33,15 @@ class Foot:
         way = self.shift * (done + eased)
         yaw = sum(self.turns[:done]) + (eased * self.turns[done] if eased and done < len(self.turns) else 0.0)
         flying = 0.0 < share < 1.0
-        vy = self.peak * math.pi / self.swing * math.sin(2 * math.pi * share)
+        vy = self._peak(t) * math.pi / self.swing * math.sin(2 * math.pi * share)
         ahead = self.shift / self.swing * (1 - math.cos(2 * math.pi * share)) if flying else 0.0
         q = (0.0, math.sin(yaw / 2), 0.0, math.cos(yaw / 2))
         v = (0.0, vy if flying else 0.0, -ahead)
         return FootSample((self.x, ANKLE + self.height(t), -way), q, v, not flying)
+
+    def _peak(self, t):
+        started = sum(begin < t for begin in self.begins)
+        return self.peaks[max(started, 1) - 1] if self.peaks else 0.0
 
     def _share(self, t):
         for begin in self.begins:
