@@ -75,7 +75,8 @@ class Health(Body):
     topics: Annotated[dict[Str, TopicHealth], Field(max_length=MAX_ITEMS)] = Field(default={}, description="by topic")
     filters: Annotated[dict[Str, FilterHealth], Field(max_length=MAX_ITEMS)] = Field(
         default={},
-        description="by `user/side`; of what a device gave, by `user/device`",
+        description="by `user/side`; of the camera's mount (found, slipped), by `user/mount`; of what a device gave, "
+        "by `user/device`",
     )
     nodes: Annotated[dict[Str, NodeHealth], Field(max_length=MAX_ITEMS)] = Field(default={}, description="by name")
     drops: Counts = Field(
