@@ -22,8 +22,6 @@ _SWING_SPEED = 0.5
 """m/s of a heel's marker over the floor: faster is a swing."""
 _LEAST_SWING_S = 0.15
 _WINDOW_S = 4.0
-_LEAST_BOB = 0.02
-"""m, from the lowest to the highest: a second with less is a pause."""
 _SLOW_S = 0.9
 """What changes over longer than this is no bob."""
 _LEAST_REGULAR = 0.5
@@ -71,8 +69,11 @@ def corridor_strides(file: Path) -> tuple[int, int]:
     return strides, len(_times(run, "right", "foot_strike"))
 
 
-def quest_cadence(file: Path) -> list[tuple[float, float]]:
-    """(bob's frequency, cadence), Hz, in each window of 4 s in which the head bobs steadily. Raises DatasetError."""
+def quest_cadence(file: Path) -> list[tuple[float, float] | None]:
+    """(bob's frequency, pace of the steps), Hz, in each window of 4 s; None where the head does not bob steadily.
+
+    Windows overlap by half. A pause is no reason to leave one out. Raises DatasetError.
+    """
     trace = datasets.quest(file)
     instants = [
         Instant(round(t * 1e9), None, None, HeadSample((p[0], p[1], p[2]), (q[0], q[1], q[2], q[3])))
@@ -80,14 +81,14 @@ def quest_cadence(file: Path) -> list[tuple[float, float]]:
     ]
     run = run_gait(instants, Settings())
     steps = np.sort(np.concatenate([_times(run, side, "toe_off") for side in SIDES]))
-    pairs = []
+    pairs: list[tuple[float, float] | None] = []
     for begin in np.arange(0.0, trace.t[-1] - _WINDOW_S, 0.5 * _WINDOW_S):
         window = (trace.t >= begin) & (trace.t < begin + _WINDOW_S)
         bob = _bob_hz(trace.t[window], trace.p[window, 1])
         inside = steps[(steps >= begin) & (steps < begin + _WINDOW_S)]
-        if bob is not None:
-            # The median: somebody who paused within the window did not step more slowly.
-            pairs.append((bob, 1.0 / float(np.median(np.diff(inside))) if len(inside) > 2 else 0.0))
+        # The median: somebody who paused within the window did not step more slowly.
+        pace = 1.0 / float(np.median(np.diff(inside))) if len(inside) > 2 else 0.0
+        pairs.append(None if bob is None else (bob, pace))
     return pairs
 
 
@@ -107,9 +108,14 @@ def real_tables(folder: Path) -> dict[str, dict[str, Any]]:
         true, strides = corridor_strides(file)
         table[f"corridor {file.stem.rpartition('_')[2]} strides"] = {"true": true, "found": strides}
     for file in sorted((folder / "quest_wip").glob("walk*.oqrec")):
-        pairs = quest_cadence(file)
-        worst = max((abs(bob - cadence) for bob, cadence in pairs), default=None)
-        table["quest, headset alone"] = {"windows": len(pairs), "largest error, Hz": worst}
+        windows = quest_cadence(file)
+        errors = [abs(pair[0] - pair[1]) for pair in windows if pair is not None]
+        table["quest, headset alone"] = {
+            "windows": len(windows),
+            "bobbing steadily": len(errors),
+            "within 0.1 Hz": sum(error <= 0.1 for error in errors),
+            "largest error, Hz": max(errors, default=None),
+        }
     return table
 
 
@@ -154,8 +160,7 @@ def _bob_hz(t: Array, height: Array) -> float | None:
     own = np.correlate(y, y, "full")[len(y) - 1 :] / np.arange(len(y), 0, -1)
     low, high = int(rate / 3.2), int(rate / 1.3)
     best = low + int(np.argmax(own[low:high]))
-    pauses = any(np.ptp(part) < _LEAST_BOB for part in np.array_split(y, round(t[-1] - t[0])))
-    if pauses or own[best] < _LEAST_REGULAR * own[0] or not low < best < high - 1:
+    if own[best] < _LEAST_REGULAR * own[0] or not low < best < high - 1:
         return None
     before, at, after = own[best - 1 : best + 2]
     return float(rate / (best + 0.5 * (before - after) / (before - 2.0 * at + after)))
