@@ -149,7 +149,8 @@ def _plugged_in(
     if camera not in PICTURES:
         raise CommandFailed(f"--camera is {', '.join(PICTURES)}, not {camera!r}", EXIT_USAGE)
     # Now, since the scenario's time runs once the service starts.
-    warm_up()
+    with Console(stderr=True).status("getting the filter ready ..."):
+        warm_up()
     finds = {"camera": camera == "simulated"}
     scenario = scenario_for(task, seed, settings, seconds=seconds, imu_hz=imu_hz, **finds)
     try:
