@@ -24,7 +24,10 @@ _TOGETHER_S = 0.02
 
 
 class FolderSource:
-    """Reads a sequence, as fast as it is read, or with `now` (bus clock, ns) from then on at its own pace."""
+    """Reads a sequence, as fast as it is read, or with `now` (bus clock, ns) from then on at its own pace.
+
+    At its own pace pictures that are due while nobody reads are missing, as their numbers show.
+    """
 
     def __init__(
         self,
@@ -47,12 +50,15 @@ class FolderSource:
 
     def read(self) -> Frame:
         """The next picture. Raises SourceEnded, and SourceError for a picture that cannot be read."""
-        if self._next >= len(self._colour) and not self._loop:
+        if not self._has(self._next):
             raise SourceEnded(f"{self._path} has {len(self._colour)} pictures")
-        round_trip, index = divmod(self._next, len(self._colour))
-        stamp, name = self._colour[index]
+        if self._now is not None:
+            # As a camera does: who comes late has missed pictures.
+            while self._has(self._next + 1) and self._taken(self._next + 1) <= self._now():
+                self._next += 1
         number, self._next = self._next, self._next + 1
-        t = round((stamp + round_trip * self._duration()) * 1e9) + self._shift
+        stamp, name = self._colour[number % len(self._colour)]
+        t = self._taken(number)
         gray = _pixels(self._path / name, cv2.IMREAD_GRAYSCALE)
         if gray is None or gray.dtype != np.uint8 or gray.ndim != 2:
             raise SourceError(f"{self._path / name} is no picture")
@@ -66,6 +72,14 @@ class FolderSource:
 
     def close(self) -> None:
         """Nothing is held."""
+
+    def _has(self, number: int) -> bool:
+        return self._loop or number < len(self._colour)
+
+    def _taken(self, number: int) -> int:
+        """Bus-clock ns at which a picture is taken, rounds counted on."""
+        rounds, index = divmod(number, len(self._colour))
+        return round((self._colour[index][0] + rounds * self._duration()) * 1e9) + self._shift
 
     def _duration(self) -> float:
         """Of one round, the gap to the next included."""

@@ -65,6 +65,16 @@ def test_a_folder_gives_pictures_depth_and_stamps(sequence: Path) -> None:
     assert len(fixes) == 1 and fixes[0].size_ratio == pytest.approx(1.0, abs=0.08)
 
 
+def test_who_comes_late_has_missed_pictures(sequence: Path) -> None:
+    clock = [10**9]
+    source = FolderSource(sequence, LENS, 0.003, now=lambda: clock[0], loop=True)
+    assert source.read().number == 0
+    clock[0] += round(5.5e9 / 60)
+    assert source.read().number == 5
+    clock[0] = 10**9 + round(6.2e9 / 60)
+    assert source.read().number == 6
+
+
 def test_arrays_are_mapped_instead_of_decoded(sequence: Path) -> None:
     decoded = read_all(FolderSource(sequence, LENS, 0.003))
     for list_name in ("rgb.txt", "depth.txt"):
