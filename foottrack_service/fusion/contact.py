@@ -50,10 +50,10 @@ PEAK, STATISTIC, DOUBTED, UNREST = 0, 1, 2, 3
 
 
 @compiled
-def stillness(t: Stamps, rows: Array, i: int) -> tuple[float, Vector]:
+def stillness(t: Stamps, rows: Array, i: int, bias: Vector = (0.0, 0.0, 0.0)) -> tuple[float, Vector]:
     """The statistic over the window that ends at the IMU row i (0: as still as can be); inf before there is one.
 
-    And the mean specific force, m/s^2.
+    And the mean specific force, m/s^2. ``bias``, m/s^2: what the accelerometer is known to be off by.
     Rates that are differences of a device's own attitude carry its corrections: they are averaged over half a window.
     """
     f0 = f1 = f2 = square = 0.0
@@ -79,7 +79,7 @@ def stillness(t: Stamps, rows: Array, i: int) -> tuple[float, Vector]:
     f0, f1, f2 = f0 / n, f1 / n, f2 / n
     norm2 = f0 * f0 + f1 * f1 + f2 * f2
     spread2 = max(0.0, square / n - norm2)
-    off = math.sqrt(norm2) - GRAVITY
+    off = math.sqrt((f0 - bias[0]) ** 2 + (f1 - bias[1]) ** 2 + (f2 - bias[2]) ** 2) - GRAVITY
     if rows[i, MEAN_RATE] == 1.0:
         rate = (late0 * late0 + late1 * late1 + late2 * late2) / late
         if n > late:
@@ -94,7 +94,7 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
     ``dt``, s, since the last sample; ``x`` and ``P`` the filter before it; ``memory``, shape (4,), is carried from
     sample to sample.
     """
-    statistic, mean = stillness(t, rows, i)
+    statistic, mean = stillness(t, rows, i, (x[10], x[11], x[12]))
     memory[STATISTIC] = statistic
     if not statistic < QUIET:
         memory[UNREST] += dt

@@ -35,6 +35,17 @@ def upright(tilt_sigma: float = 0.01) -> tuple[Array, Array]:
     return x, P
 
 
+def test_a_known_bias_of_the_accelerometer_moves_nobody() -> None:
+    t, made = still()
+    made[:, ACC + 1] += 0.6
+    assert stillness(t, made, 39)[0] == pytest.approx(2.0)
+    assert stillness(t, made, 39, (0.0, 0.6, 0.0))[0] == pytest.approx(0.0, abs=1e-6)
+    x, P = upright()
+    assert stance_sigma(t, made, 39, 0.0025, x, P, np.zeros(4)) == 0.0
+    x[11] = 0.6
+    assert stance_sigma(t, made, 39, 0.0025, x, P, np.zeros(4)) > 0.0
+
+
 def test_the_statistic_by_hand() -> None:
     t, made = still()
     statistic, mean = stillness(t, made, 39)
