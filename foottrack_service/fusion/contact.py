@@ -45,7 +45,7 @@ SEEN_NOISE = 0.04
 """m/s: fixes of a standing foot may drift apart by so much through errors of the camera's mount."""
 
 # memory, shape (4,): the swing's peak that fades, the newest sample's statistic, how long it was pushed, and for how
-# many seconds in all it was not quiet
+# many seconds in all it did not stand
 PEAK, STATISTIC, DOUBTED, UNREST = 0, 1, 2, 3
 
 
@@ -96,8 +96,7 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
     """
     statistic, mean = stillness(t, rows, i, (x[10], x[11], x[12]))
     memory[STATISTIC] = statistic
-    if not statistic < QUIET:
-        memory[UNREST] += dt
+    memory[UNREST] += dt
     if not math.isfinite(statistic):
         return 0.0
     memory[PEAK] = max(memory[PEAK] * math.exp(-dt / SWING_MEMORY_S), statistic)
@@ -112,6 +111,7 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
         memory[DOUBTED] += dt
         if memory[DOUBTED] < DOUBT_S:
             return 0.0
+    memory[UNREST] -= dt
     return STILL_SIGMA + SIGMA_GROWTH * statistic
 
 

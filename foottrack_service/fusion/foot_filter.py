@@ -116,8 +116,8 @@ class ErrorStateFilter:
     def target(self, kind: Kind, t: int) -> Target | None:
         """Where fixes of ``kind`` are expected at ``t``, ns; None while that is not well known."""
         source = self._inertial if self._inertial.begun and self._ladder.imu_alive(t) else self._pictures
-        p = source.target(kind, t)
-        return None if p is None else Target(p, self._ladder.fix_within(kind, t, SEEN_S))
+        found = source.target(kind, t)
+        return None if found is None else Target(*found, self._ladder.fix_within(kind, t, SEEN_S))
 
     def estimate(self, t: int) -> FootEstimate | None:
         """The foot predicted to ``t``; None before anything is known."""

@@ -25,8 +25,12 @@ LEAST_S, MOST_S = 0.3, 12.0
 """Between these is how long others must insist."""
 SAME_PLACE = 0.05
 """m, beyond three sigma."""
+OTHERS_S = 4.0
+"""So long at least who claims the other foot's place is taken for the other foot."""
 TAKEN = 0.08
-"""m: two shoes' tags are never so near to each other."""
+"""m, and three sigma of the other foot: two shoes' tags are never so near to each other."""
+FURTHEST_TAKEN, NEARER = 0.25, 0.6
+"""m, and share of the way to our own place: a foot that walks unseen drifts, and its tag may be so far off it."""
 NOT_OURS = 0.05
 """m: a fix that is nearer to where we expect it is looked at no further."""
 SURE_AGE_S = 0.9
@@ -98,12 +102,13 @@ class Doubt:
         if other is None or self._was_here(point, 0.0, unrest):
             return False
         gap = float(np.linalg.norm(point - other.p))
-        if gap > TAKEN or gap > float(np.linalg.norm(residual)):
+        reach = min(TAKEN + 3.0 * other.sigma, FURTHEST_TAKEN)
+        if gap > reach or gap > NEARER * float(np.linalg.norm(residual)):
             return False
         if self._taken_since is None or t < self._taken_since:
             self._taken_since = t
         # Two feet that began with each other's tags would wait for each other for ever.
-        return other.seen or (t - self._taken_since) * 1e-9 < self._lasting_s
+        return other.seen or (t - self._taken_since) * 1e-9 < max(self._lasting_s, OTHERS_S)
 
     def _insist_s(self, rejected: Rejected, unrest: float) -> float | None:
         """How long fixes such as this one must insist, 0.0: as always; None: a few are enough."""

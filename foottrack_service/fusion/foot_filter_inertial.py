@@ -50,7 +50,7 @@ from foottrack_service.rotations import Array
 
 FEET_APART = {"left": -0.1, "right": 0.1}
 """m: where a foot stands that only an IMU knows (PROTOCOL, results)."""
-KNOWN_SIGMA = 0.1
+KNOWN_SIGMA = 0.25
 """m per axis: of a foot that may claim a fix."""
 
 
@@ -213,13 +213,13 @@ class InertialFilter:
         found = predicted(self._foot, t)
         return found[0:3], found[3:7], found[7:10], float(found[10])
 
-    def target(self, kind: Kind, t: int) -> Array | None:
-        """Where in the stage fixes of ``kind`` are expected at ``t``, m; None while that is not well known."""
+    def target(self, kind: Kind, t: int) -> tuple[Array, float] | None:
+        """Where fixes of ``kind`` are expected at ``t``, stage, and its SD per axis, m; None while not well known."""
         if not self.acquired:
             return None
         ankle, q, _, sd = self.predicted(t)
         point = self._blob.point if kind == "depth" else np.array(self._settings.marker.p)
-        return ankle + rot.rotate(q, point) if sd < KNOWN_SIGMA else None
+        return (ankle + rot.rotate(q, point), sd) if sd < KNOWN_SIGMA else None
 
     def _begin(self, sample: ImuSample) -> None:
         """The first sample has come: the foot stands where it stood."""

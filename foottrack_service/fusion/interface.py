@@ -110,6 +110,8 @@ class Target(NamedTuple):
 
     p: Array
     """m, stage."""
+    sigma: float
+    """m per axis."""
     seen: bool
     """Whether such a fix was accepted there lately."""
 

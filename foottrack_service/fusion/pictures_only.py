@@ -121,12 +121,12 @@ class PicturesOnlyFilter:
         self._seen = deque(((t, p + rot.rotate(q, z)) for t, z in self._seen), maxlen=32)
         self._doubt.moved(p, q)
 
-    def target(self, kind: Kind, t: int) -> Array | None:
-        """Where in the stage the tag is expected at ``t``, m; None when it was not seen lately."""
+    def target(self, kind: Kind, t: int) -> tuple[Array, float] | None:
+        """Where in the stage the tag is expected at ``t``, and its SD per axis, m; None when it was not seen lately."""
         if self.newest is None or (t - self.newest) * 1e-9 > KNOWN_S:
             return None
-        place: Array = _stepped(self._state, self._P, max((t - self.newest) * 1e-9, 0.0))[0][0]
-        return place
+        state, P = _stepped(self._state, self._P, max((t - self.newest) * 1e-9, 0.0))
+        return state[0], math.sqrt(max(P[0, 0], 0.0))
 
     def predicted(self, t: int) -> tuple[Array, Array, Array, float]:
         """Ankle (m), attitude, velocity (m/s) and SD of the ankle per axis (m) at ``t``, ns; needs a fix before."""
