@@ -26,12 +26,16 @@ LONGEST_STEP = 0.5
 LEAVES, FARTHEST = 0.52, 0.62
 """Of the leg: who walks fast runs. The avatar's planted foot leaves the floor from the first on, though the user's
 still stands, and goes back no further than the second."""
+_REACH = 0.7
+"""Of the leg: at no speed, after no hole in the data, does a planted foot go back further."""
 _RUNNING_LIFT = 0.03
 """m: how high such a foot is held until the user's follows."""
 _LIFT_STIFFNESS, _SETTLE_STIFFNESS = 90.0, 40.0
 """1/s: how tightly it is lifted, and comes back from there."""
 _RUNNING_SPEED = 0.3
 """m/s: a slower avatar does not run."""
+_LONGEST_S = 0.025
+"""A frame that is longer is gone through in parts, or a foot would be carried past where it leaves."""
 _DOWN, _UP = 0.004, 0.03
 """m: a foot below the first stands, above the second it flies free; in between it goes along with the ground."""
 _LANDING_S = 0.045
@@ -43,15 +47,16 @@ _LAST_BRAKE = 0.4
 """m/s^2, below 0.02 m/s: an exponential never ends."""
 _RETURN_AFTER_S = 1.5
 """s of standing after which the legs come back under the hips [Z]."""
-_RETURN_S = 0.4
+_RETURN_S, _RETURN_PACE = 0.3, 1.0
+"""s, s/m: how long that takes, by the way."""
 _RETURN_LIFT, _LEAST_LIFT, _LARGEST_LIFT = 0.15, 0.02, 0.05
 """A foot returns in a small step, lifted by a share of its way within these m. It does not slide."""
 _NEAR = 0.004
 """m: closer is under the hips."""
 _STIFFNESS = 55.0
 """1/s: how tightly a foot in the air follows its goal. Low steps make much way of little height, and of its noise."""
-_JUMP = 0.02
-"""m: a foot whose height changes by so much more than its speed explains was not moved, but found elsewhere."""
+_FOUND_SPEED = 0.3
+"""m/s: a foot whose height changes by so much more than its speed explains was not moved, but found elsewhere."""
 _TURN_RATE = 20.0
 """rad/s: no ankle turns faster."""
 _HALF_PI: Final = 0.5 * math.pi
@@ -78,11 +83,12 @@ class _Leg:
         "swinging",
         "target",
         "top",
+        "vy",
         "z",
     )
 
     def __init__(self) -> None:
-        self.z = self.goal = self.rate = self.target = self.height = self.pitch = 0.0
+        self.z = self.goal = self.rate = self.target = self.height = self.vy = self.pitch = 0.0
         self.extra = self.extra_rate = 0.0
         self.swinging = self.rising = False
         self.progress = self.share = 0.0
@@ -116,16 +122,20 @@ class _Leg:
     def show(self, foot: FootPhases, dt: float) -> LegTarget:
         """The target. A foot that was lost, or found elsewhere, does not jump: what it jumped by fades."""
         height = max(0.0, foot.height)
-        jump = height - self.height - foot.vy * dt
-        if abs(jump) > _JUMP:
-            self.extra -= height - self.height
-        self.height = height
+        change, moved, found = height - self.height, 0.5 * (self.vy + foot.vy) * dt, _FOUND_SPEED * dt
+        self.extra -= change - min(max(change, min(moved, 0.0) - found), max(moved, 0.0) + found)
+        self.height, self.vy = height, foot.vy
         turn = min(max(foot.pitch - self.pitch, -_TURN_RATE * dt), _TURN_RATE * dt)
         self.pitch += turn
         return LegTarget(self.z, max(0.0, height + self.extra), self.pitch)
 
     def along(self, foot: FootPhases, speed: float, dt: float, leg: float) -> None:
         """Go after the swing's goal, and along with the ground, which moves back at ``speed`` m/s."""
+        parts = math.ceil(dt / _LONGEST_S)
+        for _ in range(parts):
+            self._go_along(foot, speed, dt / parts, leg)
+
+    def _go_along(self, foot: FootPhases, speed: float, dt: float, leg: float) -> None:
         runs = _share((-self.z / leg - LEAVES) / (FARTHEST - LEAVES)) * min(1.0, speed / _RUNNING_SPEED)
         wanted = 1.0 - runs
         if foot.phase != "stance":
@@ -141,13 +151,14 @@ class _Leg:
         self.extra, self.extra_rate = _sprung(self.extra, self.extra_rate, lift, stiffness, dt)
         change = dt / _GRIP_S
         self.down += min(max(wanted - self.down, -change), change)
-        if foot.height + self.extra < _DOWN:
+        # A drifting foot may be measured below the floor, which is no reason to hold it there.
+        if max(0.0, foot.height) + self.extra < _DOWN:
             self.down = 1.0
         if self.down >= 1.0:
             self.goal, self.rate = self.z, 0.0
         grip = _smooth(self.down)
         z, self.rate = _sprung(self.z, self.rate, self.goal, _STIFFNESS, dt)
-        way = speed * dt * grip
+        way = min(speed * dt * grip, max(0.0, self.z + _REACH * leg))
         self.z += (z - self.z) * (1.0 - grip) - way
         self.goal -= way
         self.target -= way
@@ -198,14 +209,15 @@ class WalkingLegs:
             return
         if self._returning is None:
             farther = 0 if abs(self._legs[0].z) >= abs(self._legs[1].z) else 1
-            if abs(self._legs[farther].z) < _NEAR:
+            if abs(self._legs[farther].z) < _NEAR or self._legs[farther].extra > _DOWN:
                 return
             self._returning, self._returned_s = farther, 0.0
             self._legs[farther].origin = self._legs[farther].z
         leg = self._legs[self._returning]
-        before = _carried(self._returned_s / _RETURN_S)
+        lasts = _RETURN_S + _RETURN_PACE * abs(leg.origin)
+        before = _carried(self._returned_s / lasts)
         self._returned_s += dt
-        share = min(self._returned_s / _RETURN_S, 1.0)
+        share = min(self._returned_s / lasts, 1.0)
         now = _carried(share)
         leg.z = leg.z * (1.0 - now) / (1.0 - before) if before < 1.0 else 0.0
         lift = min(max(_RETURN_LIFT * abs(leg.origin), _LEAST_LIFT), _LARGEST_LIFT)
