@@ -77,24 +77,26 @@ class TagDetector:
             part = np.asarray(cv2.resize(part, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC), np.uint8)
         side = scale * window.tag_px
         # One threshold over more than the tag: narrower ones follow the blur, and lose what it has smeared.
-        size = int(np.clip(1.5 * side, 9, 151)) | 1
+        size = int(min(max(1.5 * side, 9.0), 151.0)) | 1
         self._narrow.adaptiveThreshWinSizeMin = self._narrow.adaptiveThreshWinSizeMax = size
         self._narrow.minMarkerPerimeterRate = max(0.01, 4.0 * 0.4 * side / max(part.shape))
         self._narrow.maxMarkerPerimeterRate = max(4.0, 4.0 * 2.5 * side / max(part.shape))
         self._look.setDetectorParameters(self._narrow)
-        shift = np.array([window.left, window.top]) + (0.5 / scale - 0.5)
+        shift = (window.left + 0.5 / scale - 0.5, window.top + 0.5 / scale - 0.5)
         return [Detection(d.id, d.corners / scale + shift) for d in self._detect(self._look, part)]
 
     def _detect(self, detector: Any, picture: Gray) -> list[Detection]:
         corners, ids, _ = detector.detectMarkers(picture)
+        if ids is None:
+            return []
         largest: dict[int, Detection] = {}
-        for tag_id, four in zip(np.asarray([] if ids is None else ids).reshape(-1), corners, strict=True):
+        for tag_id, four in zip(ids.reshape(-1).tolist(), corners, strict=True):
             if tag_id not in self._ids:
                 continue
-            found = Detection(int(tag_id), np.asarray(four, dtype=np.float64).reshape(4, 2))
-            known = largest.get(found.id)
+            found = Detection(tag_id, four.reshape(4, 2).astype(np.float64))
+            known = largest.get(tag_id)
             if known is None or found.side_px > known.side_px:
-                largest[found.id] = found
+                largest[tag_id] = found
         return list(largest.values())
 
 

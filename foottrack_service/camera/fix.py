@@ -49,5 +49,4 @@ class Fix:
 
 def edge_distance(outline: Array, width: int, height: int) -> float:
     """Least distance of points (n, 2), px, to the picture's border; negative outside."""
-    (left, top), (right, bottom) = outline.min(axis=0).tolist(), outline.max(axis=0).tolist()
-    return float(min(left, top, width - 1 - right, height - 1 - bottom))
+    return float(min(min(x, y, width - 1 - x, height - 1 - y) for x, y in outline.tolist()))

@@ -80,14 +80,16 @@ class MarkerTracker:
         dt = (frame.t - track.t) * 1e-9
         if not 0.0 < dt <= LOST_AFTER_S:
             return None
-        p = track.p if track.v is None else track.p + track.v * dt
-        z = float(p[2])
+        x, y, z = track.p.tolist()
+        if track.v is not None:
+            vx, vy, vz = track.v.tolist()
+            x, y, z = x + vx * dt, y + vy * dt, z + vz * dt
         if z < 0.1:
             return None
         drift = 0.5 * _ACCELERATION_M_S2 * dt * dt if track.v is not None else _SPEED_M_S * dt
         px_per_m = self._rig.intrinsics.focal / z
         half = _MARGIN_PX + (1.3 * target.radius + min(drift, _SPEED_M_S * dt)) * px_per_m
-        u, v = self._rig.intrinsics.project(p[None])[0].tolist()
+        u, v = self._rig.intrinsics.project_one(x, y, z)
         height, width = frame.gray.shape
         left, top = int(max(0.0, u - half)), int(max(0.0, v - half))
         right, bottom = int(min(width, u + half + 1.0)), int(min(height, v + half + 1.0))
@@ -105,7 +107,7 @@ class MarkerTracker:
         if pose is None:
             return []
         p, cov, ratio = join_depth(pose, target, seen, frame, self._noise)
-        outline = np.concatenate([d.corners for d in seen])
+        outline = seen[0].corners if len(seen) == 1 else np.concatenate([d.corners for d in seen])
         t = frame.row_time(float(outline[:, 1].mean()))
         self._follow(target, t, p)
         height, width = frame.gray.shape

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
 
 from foottrack_service import rotations
+from foottrack_service.camera import pose_kernel
 from foottrack_service.camera.detector import Detection
 from foottrack_service.camera.rig import Intrinsics
-from foottrack_service.camera.targets import Tag, Target
+from foottrack_service.camera.targets import Target
 from foottrack_service.rotations import Array
 
 CORNER_SIGMA_PX = 0.25
@@ -23,9 +23,6 @@ _CONFIDENCE = 4.0
 _SAME_RAD = 0.03
 _WORSE = 6.0
 """An alternative whose residuals are so many times larger is none."""
-_NEAREST_M = 1e-3
-_IDENTITY = np.eye(3)
-_CRITERIA = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 10, 1e-9)
 
 
 @dataclass(frozen=True)
@@ -45,11 +42,10 @@ class TargetPose:
 
 @dataclass(frozen=True)
 class _Fit:
-    rotvec: Array
     R: Array
     p: Array
-    jacobian: Array
-    """(2n, 6) of the n rays by rotation vector and place."""
+    cov: Array
+    """(3, 3) of the place, for rays whose noise is 1."""
     squares: float
     """Sum of the residuals', px^2."""
 
@@ -65,15 +61,18 @@ def solve_target(
     """
     if not seen:
         return None
-    model = np.concatenate([target.corners[d.id] for d in seen])
-    rays = intrinsics.rays(np.concatenate([d.corners for d in seen]))
-    best_first = range(1) if len(seen) == 1 else sorted(range(len(seen)), key=lambda i: -seen[i].side_px)
+    if len(seen) == 1:
+        model, corners = target.corners[seen[0].id], seen[0].corners
+        best_first: Sequence[int] = (0,)
+    else:
+        model = np.concatenate([target.corners[d.id] for d in seen])
+        corners = np.concatenate([d.corners for d in seen])
+        best_first = sorted(range(len(seen)), key=lambda i: -seen[i].side_px)
+    rays = intrinsics.rays(corners)
     fits: list[_Fit] = []
     for i in best_first[:2]:
-        tag = next(tag for tag in target.tags if tag.id == seen[i].id)
-        for rotvec, place in _ippe(tag.size, rays[4 * i : 4 * i + 4]):
-            fit = _refine(*_of_target(tag, rotvec, place), model, rays, intrinsics.focal)
-            if fit is not None and not any(_same(fit, other) for other in fits):
+        for fit in _fits(target, seen[i].id, rays[4 * i : 4 * i + 4], model, rays, intrinsics.focal):
+            if not any(_same(fit, other) for other in fits):
                 fits.append(fit)
     if not fits:
         return None
@@ -81,72 +80,31 @@ def solve_target(
     first = fits[0]
     floor = sigma_px**2 * len(rays)
     second = next((fit for fit in fits[1:] if fit.squares < _WORSE**2 * (first.squares + floor)), None)
-    cov = _covariance(first, intrinsics.focal, sigma_px)
-    if cov is None:
-        return None
+    # A prior on the corners' noise, updated by this picture's own residuals: blur shows in them.
+    variance = (_CONFIDENCE * sigma_px**2 + first.squares) / (_CONFIDENCE + 2 * len(rays) - 6)
+    cov = first.cov * (variance / intrinsics.focal**2)
     if second is not None:
         # The position lies between the two solutions, and which is right is not known here.
-        apart = second.p - first.p
-        cov = cov + 0.25 * np.outer(apart, apart)
+        apart = 0.5 * (second.p - first.p)
+        cov += apart[:, None] * apart
     return TargetPose(
         first.p,
-        rotations.from_rotation_vector(first.rotvec),
-        None if second is None else rotations.from_rotation_vector(second.rotvec),
+        _quaternion(first.R),
+        None if second is None else _quaternion(second.R),
         cov,
         math.sqrt(first.squares / len(rays)),
     )
 
 
-def _ippe(size: float, rays: Array) -> list[tuple[Array, Array]]:
-    half = 0.5 * size
-    square = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
-    count, rotvecs, places, _ = cv2.solvePnPGeneric(
-        square, rays.reshape(4, 1, 2), _IDENTITY, None, flags=cv2.SOLVEPNP_IPPE_SQUARE
-    )
-    found = []
-    for i in range(count):
-        rotvec, place = _vector(rotvecs[i]), _vector(places[i])
-        if math.isfinite(rotvec.sum() + place.sum()) and place[2] > 0.0:
-            found.append((rotvec, place))
-    return found
+def _fits(target: Target, tag_id: int, seen: Array, model: Array, rays: Array, focal: float) -> list[_Fit]:
+    R, p, cov = np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 3, 3))
+    tag = target.sizes[tag_id], target.turns[tag_id], target.centres[tag_id]
+    both = pose_kernel.fit_both(*tag, seen, model, rays, R, p, cov)
+    return [_Fit(R[i], p[i], cov[i], focal**2 * both[i]) for i in range(2) if both[i] >= 0.0]
 
 
-def _of_target(tag: Tag, rotvec: Array, place: Array) -> tuple[Array, Array]:
-    """A tag's pose as its target's."""
-    if tag.p == (0.0, 0.0, 0.0) and tag.q == (0.0, 0.0, 0.0, 1.0):
-        return rotvec, place
-    R = cv2.Rodrigues(rotvec)[0] @ rotations.to_matrix(rotations.normalised(tag.q)).T
-    return _vector(cv2.Rodrigues(R)[0]), _vector(place - R @ np.asarray(tag.p))
-
-
-def _refine(rotvec: Array, p: Array, model: Array, rays: Array, focal: float) -> _Fit | None:
-    refined = cv2.solvePnPRefineLM(
-        model, rays, _IDENTITY, None, rotvec.reshape(3, 1).copy(), p.reshape(3, 1).copy(), _CRITERIA
-    )
-    rotvec, place = _vector(refined[0]), _vector(refined[1])
-    if not math.isfinite(rotvec.sum() + place.sum()):
-        return None
-    R = np.asarray(cv2.Rodrigues(rotvec)[0], dtype=np.float64)
-    if (model @ R[2]).min() + place[2] <= _NEAREST_M:
-        return None
-    projected, jacobian = cv2.projectPoints(model, rotvec, place, _IDENTITY, None)
-    residual = (projected.reshape(-1, 2) - rays).ravel()
-    return _Fit(rotvec, R, place, np.asarray(jacobian[:, :6]), focal**2 * float(residual @ residual))
-
-
-def _covariance(fit: _Fit, focal: float, sigma_px: float) -> Array | None:
-    """Of the place, (3, 3); None where the corners do not determine it."""
-    # A prior on the corners' noise, updated by this picture's own residuals: blur shows in them.
-    variance = (_CONFIDENCE * sigma_px**2 + fit.squares) / (_CONFIDENCE + len(fit.jacobian) - 6)
-    sound, inverse = cv2.invert(fit.jacobian.T @ fit.jacobian, flags=cv2.DECOMP_CHOLESKY)
-    if not sound or not math.isfinite(inverse.sum()):
-        return None
-    cov = (0.5 * variance / focal**2) * np.asarray(inverse[3:, 3:], dtype=np.float64)
-    return cov + cov.T
-
-
-def _vector(column: Any) -> Array:
-    return np.asarray(column, dtype=np.float64).reshape(3)
+def _quaternion(R: Array) -> Array:
+    return rotations.from_rotation_vector(np.asarray(cv2.Rodrigues(R)[0], dtype=np.float64).reshape(3))
 
 
 def _same(a: _Fit, b: _Fit) -> bool:

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from foottrack_service.camera.detector import Detection
-from foottrack_service.camera.frame import Frame
+from foottrack_service.camera.frame import DepthMap, Frame
 from foottrack_service.camera.pose import TargetPose
 from foottrack_service.camera.targets import Target
+from foottrack_service.fusion.compiled import compiled
 from foottrack_service.rotations import Array, rotate
 
 DEPTH_NOISE = 0.0038
@@ -46,18 +47,11 @@ def tag_depth(frame: Frame, corners: Array, noise: float) -> Range | None:
     """
     if frame.depth is None:
         return None
-    spots = np.rint(_WEIGHTS @ corners).astype(np.intp)
-    height, width = frame.depth.shape
-    columns, rows = spots[:, 0], spots[:, 1]
-    if min(columns.min(), rows.min()) < 0 or columns.max() >= width or rows.max() >= height:
-        inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
-        columns, rows = columns[inside], rows[inside]
-    read = frame.depth[rows, columns]
-    valid = read[read > 0]
-    pixels = _INNER**2 * _area(corners) * len(valid) / len(spots)
-    if pixels < _MIN_PIXELS or len(valid) < _MIN_SHARE * len(spots):
+    share, middle = _median_inside(frame.depth, corners)
+    pixels = _INNER**2 * _area(corners) * share
+    if pixels < _MIN_PIXELS or share < _MIN_SHARE:
         return None
-    z = float(np.median(valid)) * frame.depth_unit
+    z = middle * frame.depth_unit
     sigma = noise * z * z / math.sqrt(max(1.0, pixels / _CORRELATED_PX))
     return Range(z, math.hypot(sigma, _SIGMA_FLOOR_M))
 
@@ -89,7 +83,7 @@ def join_depth(
             variance = float(cov[2, 2]) + found.sigma**2
         along = cov[2]
         p = p + along * (innovation / variance)
-        cov = cov - np.outer(along, along / variance)
+        cov = cov - along[:, None] * (along / variance)
     return p, cov, statistics.median(ratios) if ratios else None
 
 
@@ -99,10 +93,28 @@ def _area(corners: Array) -> float:
     return float(0.5 * abs((cx - ax) * (dy - by) - (cy - ay) * (dx - bx)))
 
 
-def _spots() -> Array:
-    """Bilinear weights (n, 4) of a tag's corners, at spots of its inner part."""
-    u, v = np.meshgrid(*2 * [0.5 + _INNER * np.linspace(-0.5, 0.5, _SPOTS)])
-    return np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=-1).reshape(-1, 4)
-
-
-_WEIGHTS = _spots()
+@compiled
+def _median_inside(depth: DepthMap, corners: Array) -> tuple[float, float]:
+    """The share of a tag's inner part that has a depth (outside of the picture is none), and the median of it."""
+    height, width = depth.shape
+    found = np.empty(_SPOTS * _SPOTS, np.uint16)
+    valid = 0
+    for i in range(_SPOTS):
+        v = 0.5 + _INNER * (i / (_SPOTS - 1) - 0.5)
+        for j in range(_SPOTS):
+            u = 0.5 + _INNER * (j / (_SPOTS - 1) - 0.5)
+            a, b, c, d = (1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v
+            x = a * corners[0, 0] + b * corners[1, 0] + c * corners[2, 0] + d * corners[3, 0]
+            y = a * corners[0, 1] + b * corners[1, 1] + c * corners[2, 1] + d * corners[3, 1]
+            if not (-0.5 < x < width - 0.5 and -0.5 < y < height - 0.5):
+                continue
+            z = depth[int(y + 0.5), int(x + 0.5)]
+            if z > 0:
+                found[valid] = z
+                valid += 1
+    if valid == 0:
+        return 0.0, 0.0
+    known = np.sort(found[:valid])
+    half = valid // 2
+    middle = float(known[half]) if valid % 2 else 0.5 * (float(known[half - 1]) + float(known[half]))
+    return valid / (_SPOTS * _SPOTS), middle

@@ -37,6 +37,10 @@ class Target:
     """Per tag id the (4, 3) corners in the target's frame."""
     centres: dict[int, Array] = field(init=False, repr=False, compare=False)
     """Per tag id its centre (3,) there."""
+    turns: dict[int, Array] = field(init=False, repr=False, compare=False)
+    """Per tag id its rotation (3, 3), tag to target."""
+    sizes: dict[int, float] = field(init=False, repr=False, compare=False)
+    """Per tag id its size, m."""
     smallest: float = field(init=False, repr=False, compare=False)
     """Size of the smallest tag, m."""
     radius: float = field(init=False, repr=False, compare=False)
@@ -50,6 +54,9 @@ class Target:
             raise ValueError(f"tag sizes of the {self.side} target are in metres, above 0 and below 1")
         object.__setattr__(self, "corners", {tag.id: tag.corners() for tag in self.tags})
         object.__setattr__(self, "centres", {tag.id: np.array(tag.p) for tag in self.tags})
+        turns = {tag.id: rotations.to_matrix(rotations.normalised(tag.q)) for tag in self.tags}
+        object.__setattr__(self, "turns", turns)
+        object.__setattr__(self, "sizes", {tag.id: tag.size for tag in self.tags})
         object.__setattr__(self, "smallest", min(tag.size for tag in self.tags))
         reach = max(np.linalg.norm(corners, axis=1).max() for corners in self.corners.values())
         object.__setattr__(self, "radius", float(reach))
