@@ -38,8 +38,8 @@ _LONGEST_S = 0.025
 """A frame that is longer is gone through in parts, or a foot would be carried past where it leaves."""
 _DOWN, _UP = 0.004, 0.03
 """m: a foot below the first stands, above the second it flies free; in between it goes along with the ground."""
-_LANDING_S = 0.045
-_GRIP_S = 0.06
+_LANDING_S = 0.06
+_GRIP_S = 0.05
 """s: from flying free to standing, and back, at the soonest."""
 _SPEED_S = 0.15
 """s: how fast the avatar's speed follows the model's."""
@@ -119,15 +119,18 @@ class _Leg:
             self.goal += (self.target - self.goal) * ((progress - self.progress) / left if left > 1e-6 else 1.0)
             self.progress = progress
 
-    def show(self, foot: FootPhases, dt: float) -> LegTarget:
-        """The target. A foot that was lost, or found elsewhere, does not jump: what it jumped by fades."""
+    def measure(self, foot: FootPhases, dt: float) -> None:
+        """Take the user's foot. One that was lost, or found elsewhere, does not jump: what it jumped by fades."""
         height = max(0.0, foot.height)
         change, moved, found = height - self.height, 0.5 * (self.vy + foot.vy) * dt, _FOUND_SPEED * dt
         self.extra -= change - min(max(change, min(moved, 0.0) - found), max(moved, 0.0) + found)
         self.height, self.vy = height, foot.vy
-        turn = min(max(foot.pitch - self.pitch, -_TURN_RATE * dt), _TURN_RATE * dt)
-        self.pitch += turn
-        return LegTarget(self.z, max(0.0, height + self.extra), self.pitch)
+        self.pitch += min(max(foot.pitch - self.pitch, -_TURN_RATE * dt), _TURN_RATE * dt)
+
+    @property
+    def shown(self) -> LegTarget:
+        """The target."""
+        return LegTarget(self.z, max(0.0, self.height + self.extra), self.pitch)
 
     def along(self, foot: FootPhases, speed: float, dt: float, leg: float) -> None:
         """Go after the swing's goal, and along with the ground, which moves back at ``speed`` m/s."""
@@ -182,6 +185,7 @@ class WalkingLegs:
             self._speed = max(0.0, self._speed - _LAST_BRAKE * dt)
         speed = self._speed
         for index, (leg, foot) in enumerate(zip(self._legs, feet, strict=True)):
+            leg.measure(foot, dt)
             if foot.phase != "stance":
                 if self._returning == index:
                     self._returning = None
@@ -190,7 +194,7 @@ class WalkingLegs:
                 leg.swinging = False
             leg.along(foot, speed, dt, self._leg)
         self._return(t, dt, feet, steps)
-        left, right = (leg.show(foot, dt) for leg, foot in zip(self._legs, feet, strict=True))
+        left, right = (leg.shown for leg in self._legs)
         drop = pelvis_drop(self._leg, left.z, right.z)
         return LegTargets(left, right, -drop, speed, steps.walking or speed > 0.0)
 
