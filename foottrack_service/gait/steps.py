@@ -31,6 +31,8 @@ _TURNING_S, _LAST_TURN = 1.5, 0.2
 _WALK_SPEED, _WALK_WAY = 0.8, 0.28
 """m/s and m of a step in the midst of walking in place: more, and the person really walks."""
 _LEAST_INTERVAL_S, _LONGEST_INTERVAL_S = 0.2, 2.0
+_UNEVEN = 1.35
+"""Times the one before: an interval that differs by more shows another pace, not another leg."""
 _FIRST_SHARE = 0.8
 """Of a step's duration: its swing. Good for the first step, when no interval is known."""
 _STOP_SHARE, _STOP_PLUS_S = 1.5, 0.1
@@ -87,7 +89,7 @@ class Steps:
         self.stopped_ns: int | None = None
         """When the last walk ended."""
         self._swings: dict[Side, _Swing | None] = {"left": None, "right": None}
-        self._last: dict[str, int] = {}
+        self._last: dict[str, tuple[int, ...]] = {}
         self._intervals: deque[float] = deque(maxlen=3)
         self._supports: deque[float] = deque(maxlen=3)
         self._landed: int | None = None
@@ -192,18 +194,21 @@ class Steps:
     def _begin(self, swing: _Swing, swing_s: float, events: list[Event]) -> None:
         self.walking, self.stopped_ns, swing.first = True, None, True
         self._intervals.clear()
-        self._last = {"toe_off": swing.off}
+        self._last = {"toe_off": (swing.off,)}
         self.step_s = min(max(swing_s / _FIRST_SHARE, 0.4), 1.2)
         events.append((swing.off, "first_step", None, swing.number))
 
     def _interval(self, name: str, at: int) -> None:
-        last = self._last.get(name)
-        self._last[name] = at
-        if last is None or not self.walking:
+        last = self._last.get(name, ())
+        self._last[name] = (*last[-1:], at)
+        if not last or not self.walking:
             return
-        interval = (at - last) * 1e-9
+        interval = (at - last[-1]) * 1e-9
         if _LEAST_INTERVAL_S < interval < _LONGEST_INTERVAL_S:
-            self._intervals.append(interval)
+            # Left and right differ: two even steps make a stride, which has a pace.
+            before = (last[-1] - last[0]) * 1e-9
+            even = interval < _UNEVEN * before and before < _UNEVEN * interval
+            self._intervals.append(0.5 * (before + interval) if even else interval)
             self.step_s = median(self._intervals)
 
     def _goes(self, swing: _Swing, foot: FootSample) -> bool:

@@ -121,6 +121,15 @@ def test_gud_wip_is_its_formula():
     assert np.median(column(outs, lambda out: out.ik.speed)[-4 * HZ :]) == pytest.approx(expected, rel=0.03)
 
 
+def test_the_cadence_of_somebody_who_limps_is_steady():
+    lefts = [1.0 + 0.88 * k for k in range(8)]
+    left, right = (Foot(x, begins, 0.3, 0.12) for x, begins in ((-0.1, lefts), (0.1, [b + 0.39 for b in lefts])))
+    outs = feed(ours(), left, right, 7.0)
+    cadence = np.array([out.state.cadence for t, out in outs if t > 2.8])
+    # Step by step it would go from 2.04 to 2.56 and back.
+    assert cadence == pytest.approx(2 / 0.88, rel=0.02)
+
+
 def test_events_are_interpolated_and_say_which_foot_and_step():
     left, right = marching(1.6, 0.15, 6.0)
     outs = feed(ours(), left, right, 8.0)
