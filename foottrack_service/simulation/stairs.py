@@ -17,7 +17,7 @@ from foottrack_service.simulation.footsteps import Step, stepping
 from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.posture import Bearing, Extra, carried
 from foottrack_service.simulation.stride import CAUTIOUS, Planner
-from foottrack_service.simulation.truth import FootTrack, Track, Truth, grid
+from foottrack_service.simulation.truth import Truth, grid
 
 RISE, TREAD = 0.17, 0.32
 """m of one stair."""
@@ -28,7 +28,8 @@ _STAND_S = 1.5
 
 
 def stairs(seconds: float, settings: Settings, feet: Feet, random: np.random.Generator) -> Truth:
-    """One foot up, the other beside it, both stairs; a rest; down again. Head and hips rise with the feet's mean."""
+    """One foot up, the other beside it, both stairs; a rest; down again. Hips and head rise with the feet's mean,
+    as far as the lower leg reaches."""
     plan = Planner(random)
     rises: dict[Side, list[tuple[Step, float]]] = {"left": [], "right": []}
     way = 1
@@ -46,15 +47,14 @@ def stairs(seconds: float, settings: Settings, feet: Feet, random: np.random.Gen
     samples = {
         side: stepping(t, plan.start[side], plan.steps[side], sole(settings.feet.of(side))) for side in plan.start
     }
-    wearer = person(settings.body, settings.feet.left.ankle_height)
-    head, hips = carried(samples["left"], samples["right"], wearer, Bearing(), Extra(), random)
     heights = {side: _heights(t, taken) for side, taken in rises.items()}
-    mean = 0.5 * (heights["left"] + heights["right"])
-    tracks: dict[Side, FootTrack] = {}
     for side, foot in samples.items():
         foot.p[:, 1] += heights[side]
-        tracks[side] = footwear.track(foot, sole(settings.feet.of(side)), feet, random)
-    return Truth(seconds, _raised(head, t, mean), tracks, _raised(hips, t, mean))
+    wearer = person(settings.body, settings.feet.left.ankle_height)
+    climb = Extra(crouch=-0.5 * (heights["left"] + heights["right"]))
+    head, hips = carried(samples["left"], samples["right"], wearer, Bearing(), climb, random)
+    tracks = {side: footwear.track(foot, sole(settings.feet.of(side)), feet, random) for side, foot in samples.items()}
+    return Truth(seconds, head, tracks, hips)
 
 
 def _heights(t: Array, rises: Sequence[tuple[Step, float]]) -> Array:
@@ -63,8 +63,3 @@ def _heights(t: Array, rises: Sequence[tuple[Step, float]]) -> Array:
     for step, rise in rises:
         height += rise * ease((t - step.start) / step.style.swing)
     return height
-
-
-def _raised(track: Track, t: Array, rise: Array) -> Track:
-    p, q = track.pose(t)
-    return Track(t, p + rise[:, None] * [0.0, 1.0, 0.0], q)
