@@ -88,7 +88,7 @@ class MarkerTracker:
             return None
         drift = 0.5 * _ACCELERATION_M_S2 * dt * dt if track.v is not None else _SPEED_M_S * dt
         px_per_m = self._rig.intrinsics.focal / z
-        half = _MARGIN_PX + (1.3 * target.radius + min(drift, _SPEED_M_S * dt)) * px_per_m
+        half = _MARGIN_PX + (1.15 * target.radius + min(drift, _SPEED_M_S * dt)) * px_per_m
         u, v = self._rig.intrinsics.project_one(x, y, z)
         height, width = frame.gray.shape
         left, top = int(max(0.0, u - half)), int(max(0.0, v - half))
@@ -108,7 +108,7 @@ class MarkerTracker:
             return []
         p, cov, ratio = join_depth(pose, target, seen, frame, self._noise)
         outline = seen[0].corners if len(seen) == 1 else np.concatenate([d.corners for d in seen])
-        t = frame.row_time(float(outline[:, 1].mean()))
+        t = frame.row_time(sum(outline[:, 1].tolist()) / len(outline))
         self._follow(target, t, p)
         height, width = frame.gray.shape
         rig = self._rig
@@ -126,7 +126,7 @@ class MarkerTracker:
                 reproj_px=pose.reproj_px,
                 edge_px=edge_distance(outline, width, height),
                 outline=outline,
-                label=f"{target.side} {'+'.join(str(d.id) for d in seen)} {p[2]:.2f} m",
+                label=f"{target.side} {'+'.join(str(d.id) for d in seen)} {float(p[2]):.2f} m",
             )
         ]
 
