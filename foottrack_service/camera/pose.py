@@ -6,10 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
-from foottrack_service import rotations
 from foottrack_service.camera import pose_kernel
 from foottrack_service.camera.detector import Detection
 from foottrack_service.camera.rig import Intrinsics
@@ -43,6 +41,7 @@ class TargetPose:
 @dataclass(frozen=True)
 class _Fit:
     R: Array
+    q: Array
     p: Array
     cov: Array
     """(3, 3) of the place, for rays whose noise is 1."""
@@ -89,22 +88,18 @@ def solve_target(
         cov += apart[:, None] * apart
     return TargetPose(
         first.p,
-        _quaternion(first.R),
-        None if second is None else _quaternion(second.R),
+        first.q,
+        None if second is None else second.q,
         cov,
         math.sqrt(first.squares / len(rays)),
     )
 
 
 def _fits(target: Target, tag_id: int, seen: Array, model: Array, rays: Array, focal: float) -> list[_Fit]:
-    R, p, cov = np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 3, 3))
+    R, q, p, cov = np.empty((2, 3, 3)), np.empty((2, 4)), np.empty((2, 3)), np.empty((2, 3, 3))
     tag = target.sizes[tag_id], target.turns[tag_id], target.centres[tag_id]
-    both = pose_kernel.fit_both(*tag, seen, model, rays, R, p, cov)
-    return [_Fit(R[i], p[i], cov[i], focal**2 * both[i]) for i in range(2) if both[i] >= 0.0]
-
-
-def _quaternion(R: Array) -> Array:
-    return rotations.from_rotation_vector(np.asarray(cv2.Rodrigues(R)[0], dtype=np.float64).reshape(3))
+    both = pose_kernel.fit_both(*tag, seen, model, rays, R, q, p, cov)
+    return [_Fit(R[i], q[i], p[i], cov[i], focal**2 * both[i]) for i in range(2) if both[i] >= 0.0]
 
 
 def _same(a: _Fit, b: _Fit) -> bool:

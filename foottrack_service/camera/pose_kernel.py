@@ -21,14 +21,23 @@ _LEAST_PIVOT = 1e-300
 
 @compiled
 def fit_both(
-    size: float, tag_R: Array, tag_p: Array, seen: Array, model: Array, rays: Array, R: Array, p: Array, cov: Array
+    size: float,
+    tag_R: Array,
+    tag_p: Array,
+    seen: Array,
+    model: Array,
+    rays: Array,
+    R: Array,
+    q: Array,
+    p: Array,
+    cov: Array,
 ) -> tuple[float, float]:
     """The two poses of IPPE that one tag leaves open, each refined over all corners; sums of their squared residuals.
 
     The tag, of ``size`` m, stands at ``tag_p`` (3,) m, ``tag_R`` (3, 3) in its target's frame, and is ``seen`` along
-    the rays (4, 2). ``model`` (n, 3) m and ``rays`` (n, 2) are of all corners. Written: ``R`` (2, 3, 3) and ``p``
-    (2, 3) of the target, ``cov`` (2, 3, 3) of the place for rays whose noise is 1 per axis. -1.0 instead of a sum: no
-    such pose is before the camera, finite, and determined by the corners.
+    the rays (4, 2). ``model`` (n, 3) m and ``rays`` (n, 2) are of all corners. Written: ``R`` (2, 3, 3), the same as
+    ``q`` (2, 4), and ``p`` (2, 3) of the target, ``cov`` (2, 3, 3) of the place for rays whose noise is 1 per axis.
+    -1.0 instead of a sum: no such pose is before the camera, finite, and determined by the corners.
     """
     if not _ippe(size, seen, R, p):
         return -1.0, -1.0
@@ -42,7 +51,10 @@ def fit_both(
                 R[k, i, j] = start[i, 0] * tag_R[j, 0] + start[i, 1] * tag_R[j, 1] + start[i, 2] * tag_R[j, 2]
         for i in range(3):
             p[k, i] -= R[k, i, 0] * tag_p[0] + R[k, i, 1] * tag_p[1] + R[k, i, 2] * tag_p[2]
-    return _refine(model, rays, R[0], p[0], cov[0]), _refine(model, rays, R[1], p[1], cov[1])
+    squares = _refine(model, rays, R[0], p[0], cov[0]), _refine(model, rays, R[1], p[1], cov[1])
+    for k in range(2):
+        _quaternion(R[k], q[k])
+    return squares
 
 
 @compiled
@@ -214,3 +226,22 @@ def _turn(R: Array, x: float, y: float, z: float, turned: Array) -> None:
         turned[0, j] = keep * a + along * x + sine * (y * c - z * b)
         turned[1, j] = keep * b + along * y + sine * (z * a - x * c)
         turned[2, j] = keep * c + along * z + sine * (x * b - y * a)
+
+
+@compiled
+def _quaternion(R: Array, q: Array) -> None:
+    """[x, y, z, w] of a rotation matrix (Shepperd's choice of pivot)."""
+    pivot, largest = 3, R[0, 0] + R[1, 1] + R[2, 2]
+    trace = largest
+    for i in range(3):
+        if R[i, i] > largest:
+            pivot, largest = i, R[i, i]
+    if pivot == 3:
+        q[0], q[1], q[2], q[3] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 1.0 + trace
+    else:
+        i, j, k = pivot, (pivot + 1) % 3, (pivot + 2) % 3
+        q[i], q[j], q[k] = 1.0 + 2.0 * R[i, i] - trace, R[i, j] + R[j, i], R[i, k] + R[k, i]
+        q[3] = R[k, j] - R[j, k]
+    norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    for i in range(4):
+        q[i] = q[i] / norm

@@ -108,6 +108,8 @@ class Rig:
     """(4,) OpenCV's camera frame to the head frame."""
     R_cv: Array = field(init=False, repr=False, compare=False)
     """(3, 3) the same as a matrix."""
+    p_cv: Array = field(init=False, repr=False, compare=False)
+    """(3,) m of the camera in the head frame."""
 
     def __post_init__(self) -> None:
         if not np.all(np.isfinite(self.mount_p)):
@@ -115,14 +117,15 @@ class Rig:
         q_cv = rotations.multiply(rotations.normalised(self.mount_q), CV_TO_CAMERA)
         object.__setattr__(self, "q_cv", q_cv)
         object.__setattr__(self, "R_cv", rotations.to_matrix(q_cv))
+        object.__setattr__(self, "p_cv", np.array(self.mount_p))
 
     def to_head(self, p_cv: npt.ArrayLike) -> Array:
         """Points, shape (..., 3), m, from OpenCV's camera frame to the head frame."""
-        return np.asarray(np.asarray(p_cv, dtype=np.float64) @ self.R_cv.T + np.asarray(self.mount_p))
+        return np.asarray(np.asarray(p_cv, dtype=np.float64) @ self.R_cv.T + self.p_cv)
 
     def from_head(self, p_head: npt.ArrayLike) -> Array:
         """Points, shape (..., 3), m, from the head frame to OpenCV's camera frame."""
-        return np.asarray((np.asarray(p_head, dtype=np.float64) - np.asarray(self.mount_p)) @ self.R_cv)
+        return np.asarray((np.asarray(p_head, dtype=np.float64) - self.p_cv) @ self.R_cv)
 
     def rotation_to_head(self, q: npt.ArrayLike) -> Array:
         """Rotation(s) body to OpenCV's camera, shape (..., 4), as body to head."""
