@@ -13,9 +13,9 @@ from foottrack_service.camera.detector import Detection, TagDetector, Window
 from foottrack_service.camera.fix import Fix, edge_distance
 from foottrack_service.camera.frame import Frame
 from foottrack_service.camera.pose import CORNER_SIGMA_PX, solve_target
-from foottrack_service.camera.ranging import DEPTH_NOISE, join_depth
-from foottrack_service.camera.rig import Rig
-from foottrack_service.camera.targets import Target, owners
+from foottrack_service.camera.ranging import DEPTH_NOISE, join_depth, tag_depth
+from foottrack_service.camera.rig import D435_COLOUR, Rig
+from foottrack_service.camera.targets import Tag, Target, owners
 from foottrack_service.rotations import Array
 
 LOST_AFTER_S = 0.1
@@ -144,3 +144,12 @@ class MarkerTracker:
         if before is not None and 0 < t - before.t <= LOST_AFTER_S * 1e9:
             v = (p - before.p) / ((t - before.t) * 1e-9)
         self._tracks[target.side] = _Track(t, p, v)
+
+
+def warm_up() -> None:
+    """Compile what the first tag in view would wait for: seconds on a machine that never did, else milliseconds."""
+    target = Target("left", (Tag(0, 0.06),))
+    corners = D435_COLOUR.project(target.corners[0] * (1.0, -1.0, -1.0) + (0.0, 0.0, 1.0))
+    solve_target(target, [Detection(0, corners)], D435_COLOUR)
+    shape = D435_COLOUR.height, D435_COLOUR.width
+    tag_depth(Frame(np.zeros(shape, np.uint8), np.zeros(shape, np.uint16), 0, 0), corners, DEPTH_NOISE)

@@ -21,6 +21,7 @@ import cv2
 from foottrack_protocol.messages import Optical, RawPicture
 from foottrack_service.camera import overlay, raw
 from foottrack_service.camera.frame import Frame, Source, SourceEnded, SourceError
+from foottrack_service.camera.marker_tracker import warm_up
 from foottrack_service.camera.setup import Trackers, open_source
 from foottrack_service.config import Settings
 
@@ -124,6 +125,8 @@ def work(connection: Connection, settings: dict[str, Any]) -> None:
     source: Source | None = None
     try:
         loaded = Settings(**settings)
+        # Before pictures come, so that none is late for it.
+        warm_up()
         source = open_source(loaded, time.perf_counter_ns)
         trackers = Trackers(loaded.camera, source.intrinsics)
         connection.send(Opened())
