@@ -130,14 +130,15 @@ def why_not(context: Context, endpoint: str, kind: int, who: Credentials | None)
                 f"{endpoint} does not let the key {who.own.public} in: "
                 "the service's [bus.curve] clients do not name it, or not for this role"
             )
-        case zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL if who is None:
+        # Which of the two it is depends on who closes first.
+        case zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL if who is None:
             return f"{endpoint} takes encrypted connections only: set [bus.curve] secret and service, or run a relay"
         case zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL:
             return f"{endpoint} does not speak CURVE: is that one of the ports of the service's [bus.curve] listen?"
         case zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL if who is not None:
             return (
                 f"{endpoint} broke the handshake off: it has another key than [bus.curve] service = "
-                f'"{who.service}", or is no foottrack'
+                f'"{who.service}", or does not speak CURVE'
             )
     return nobody
 

@@ -26,15 +26,16 @@ _WATCHED = (
     | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL
     | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
 )
+# A peer of the other kind fails by protocol or without detail: it depends on who closes first.
 _TROUBLE: dict[bool, dict[int, str]] = {
     True: {
         zmq.EVENT_HANDSHAKE_FAILED_AUTH: "the service does not know our key, or not for this role",
         zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL: "it does not speak CURVE: is that one of its encrypted ports?",
-        zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL: "it breaks off: it has another key, or is no foottrack",
+        zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL: "it breaks off: it has another key, or does not speak CURVE",
     },
     False: {
         zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL: "it takes encrypted connections only, or is no foottrack: give keys",
-        zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL: "it breaks off: is it a foottrack?",
+        zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL: "it takes encrypted connections only, or is no foottrack: give keys",
     },
 }
 
