@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +14,11 @@ from foottrack_service.camera.detector import Detection, TagDetector, Window
 from foottrack_service.camera.fix import Fix, edge_distance
 from foottrack_service.camera.frame import Frame
 from foottrack_service.camera.pose import CORNER_SIGMA_PX, solve_target
+from foottrack_service.camera.pose_kernel import fit_both
 from foottrack_service.camera.ranging import DEPTH_NOISE, join_depth, tag_depth
 from foottrack_service.camera.rig import D435_COLOUR, Rig
 from foottrack_service.camera.targets import Tag, Target, owners
+from foottrack_service.compiled import is_compiled
 from foottrack_service.rotations import Array
 
 LOST_AFTER_S = 0.1
@@ -23,6 +26,7 @@ LOST_AFTER_S = 0.1
 SEARCH_PERIOD_S = 0.05
 """A whole picture costs ten windows: while a tag is lost, one is searched so often."""
 
+_log = logging.getLogger(__name__)
 _SPEED_M_S = 5.0
 _ACCELERATION_M_S2 = 150.0
 """What foot and head together may do between two pictures; it widens the windows."""
@@ -146,8 +150,14 @@ class MarkerTracker:
         self._tracks[target.side] = _Track(t, p, v)
 
 
+def say_what_takes_long() -> None:
+    """Tell that ``warm_up`` will compile: it may run in a process of its own, whose log nobody reads."""
+    if not is_compiled(fit_both):
+        _log.info("compiling the tag tracker for this machine: about ten seconds, this once")
+
+
 def warm_up() -> None:
-    """Compile what the first tag in view would wait for: seconds on a machine that never did, else milliseconds."""
+    """Compile what the first tag in view would wait for, or read it from the cache."""
     target = Target("left", (Tag(0, 0.06),))
     corners = D435_COLOUR.project(target.corners[0] * (1.0, -1.0, -1.0) + (0.0, 0.0, 1.0))
     solve_target(target, [Detection(0, corners)], D435_COLOUR)

@@ -13,6 +13,7 @@ from typing import Any
 
 from foottrack_protocol.messages import CameraPreview
 from foottrack_service.bus.connection import Bus
+from foottrack_service.camera.marker_tracker import say_what_takes_long
 from foottrack_service.camera.process import RAW_OFF, RAW_ON, STOP, Ended, Fixes, Opened, Picture, Report, work
 from foottrack_service.config import Settings
 
@@ -35,6 +36,7 @@ async def run(bus: Bus, settings: Settings) -> None:
     """
     publisher = bus.publisher(SOURCE)
     await publisher.ready()
+    say_what_takes_long()
     process, connection = _start(settings)
     reports: asyncio.Queue[Report] = asyncio.Queue()
     reader = _read_in_thread(connection, reports)

@@ -1,7 +1,4 @@
-"""The least squares of a target's pose, compiled: a tracked picture has some hundred us for all of its numbers.
-
-Numba renews its cache of these when this file changes; so nothing here is taken from another room's kernels.
-"""
+"""The least squares of a target's pose, compiled: a tracked picture has some hundred us for all of its numbers."""
 
 from __future__ import annotations
 
@@ -9,13 +6,16 @@ import math
 
 import numpy as np
 
-from foottrack_service.fusion.compiled import compiled
+from foottrack_service.compiled import compiled
 from foottrack_service.rotations import Array
 
 _NEAREST_M = 1e-3
+"""A corner that is nearer to the camera's plane is not seen."""
 _STEPS = 4
 _SMALL_STEP = 1e-9
+"""rad and m together: what moves less is there."""
 _TRUST = 1e-3
+"""Levenberg's share of the diagonal, at first."""
 _LEAST_PIVOT = 1e-300
 
 

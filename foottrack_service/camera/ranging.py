@@ -13,7 +13,7 @@ from foottrack_service.camera.detector import Detection
 from foottrack_service.camera.frame import DepthMap, Frame
 from foottrack_service.camera.pose import TargetPose
 from foottrack_service.camera.targets import Target
-from foottrack_service.fusion.compiled import compiled
+from foottrack_service.compiled import compiled
 from foottrack_service.rotations import Array, rotate
 
 DEPTH_NOISE = 0.0038

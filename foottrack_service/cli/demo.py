@@ -144,13 +144,18 @@ def _plugged_in(
     from foottrack_service.camera.frame import SourceError
     from foottrack_service.cli.sim import scenario_for
     from foottrack_service.demo.hardware import PICTURES, Hardware
-    from foottrack_service.fusion.foot_filter import warm_up
+    from foottrack_service.fusion import foot_filter
 
     if camera not in PICTURES:
         raise CommandFailed(f"--camera is {', '.join(PICTURES)}, not {camera!r}", EXIT_USAGE)
     # Now, since the scenario's time runs once the service starts.
-    with Console(stderr=True).status("getting the filter ready ..."):
-        warm_up()
+    with Console(stderr=True).status("getting the filter and the tracker ready ..."):
+        foot_filter.warm_up()
+        if camera == "rendered":
+            from foottrack_service.camera import marker_tracker
+
+            marker_tracker.say_what_takes_long()
+            marker_tracker.warm_up()
     finds = {"camera": camera == "simulated"}
     scenario = scenario_for(task, seed, settings, seconds=seconds, imu_hz=imu_hz, **finds)
     try:

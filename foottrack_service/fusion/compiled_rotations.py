@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from foottrack_service.fusion.compiled import compiled
+from foottrack_service.compiled import compiled
 from foottrack_service.rotations import Array
 
 Vector = tuple[float, float, float]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from foottrack_service.fusion.compiled import compiled
+from foottrack_service.compiled import compiled
 from foottrack_service.fusion.compiled_rotations import Vector, quaternion, rotation, squared, turned
 from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE, Stamps
 from foottrack_service.fusion.foot_filter_kernel import GRAVITY

@@ -13,9 +13,10 @@ import numpy as np
 
 from foottrack_protocol.messages import Side
 from foottrack_service import rotations as rot
+from foottrack_service.compiled import is_compiled
 from foottrack_service.config import FootSettings, Placement
-from foottrack_service.fusion.compiled import is_compiled
 from foottrack_service.fusion.foot_filter_inertial import InertialFilter
+from foottrack_service.fusion.foot_filter_sample import take_sample
 from foottrack_service.fusion.interface import (
     FootEstimate,
     HeadSample,
@@ -135,7 +136,7 @@ class ErrorStateFilter:
 
 def warm_up() -> None:
     """Compile the kernels, or read them from the cache, before the first sample needs them, and say so."""
-    if not is_compiled():
+    if not is_compiled(take_sample):
         _log.info("compiling the foot filter for this machine: about half a minute, this once")
     trial, mount = ErrorStateFilter(FootSettings(), "left"), MountCalibrator()
     step = 5_000_000

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from foottrack_service.fusion.compiled import compiled
+from foottrack_service.compiled import compiled
 from foottrack_service.fusion.compiled_rotations import (
     Matrix,
     Vector,

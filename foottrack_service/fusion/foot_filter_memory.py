@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from foottrack_service.fusion.compiled import compiling_is_off
+from foottrack_service.compiled import compiling_is_off
 from foottrack_service.fusion.foot_filter_events import COLUMNS
 from foottrack_service.fusion.foot_filter_kernel import NE, NX
 

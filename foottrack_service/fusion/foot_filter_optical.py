@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from foottrack_service import rotations as rot
+from foottrack_service.compiled import compiled
 from foottrack_service.config import FootSettings
-from foottrack_service.fusion.compiled import compiled
 from foottrack_service.fusion.compiled_rotations import Vector, product, quaternion, rotation, squared, turned, vector
 from foottrack_service.fusion.contact import see
 from foottrack_service.fusion.foot_filter_doubt import NOT_OURS

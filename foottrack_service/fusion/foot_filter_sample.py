@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from foottrack_service import rotations as rot
-from foottrack_service.fusion.compiled import compiled
+from foottrack_service.compiled import compiled
 from foottrack_service.fusion.compiled_rotations import conjugate, logarithm, product, quaternion, rotation, squared
 from foottrack_service.fusion.contact import STATISTIC, stance_sigma
 from foottrack_service.fusion.foot_filter_events import (

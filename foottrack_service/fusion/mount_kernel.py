@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foottrack_service.fusion.compiled import compiled
+from foottrack_service.compiled import compiled
 from foottrack_service.fusion.compiled_rotations import quaternion, rotation, turned, vector
 from foottrack_service.fusion.foot_filter_kernel import invert3
 from foottrack_service.rotations import Array

@@ -7,7 +7,7 @@ Method: commaai/rednose's checkpoints; T. D. Larsen et al., Incorporation of tim
 
 from __future__ import annotations
 
-from foottrack_service.fusion.compiled import compiled
+from foottrack_service.compiled import compiled
 from foottrack_service.fusion.foot_filter_events import COLUMNS, Stamps
 from foottrack_service.fusion.foot_filter_kernel import NE, NX
 from foottrack_service.fusion.foot_filter_memory import KEPT, Feet, Foot

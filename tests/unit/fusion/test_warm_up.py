@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 CODE = """
 import sys
@@ -38,4 +40,21 @@ assert after == before, {name: count for name, count in after.items() if count !
 
 def test_nothing_is_left_to_compile_in_the_middle_of_a_stream() -> None:
     done = subprocess.run([sys.executable, "-c", CODE], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+ASKED = """
+import numpy as np
+from foottrack_service.camera import pose_kernel
+from foottrack_service.compiled import is_compiled
+assert not is_compiled(pose_kernel.fit_both) and not is_compiled(pose_kernel._quaternion)
+pose_kernel._quaternion(np.eye(3), np.empty(4))
+assert is_compiled(pose_kernel._quaternion)
+assert not is_compiled(pose_kernel.fit_both), "another kernel's cache was taken for its own"
+"""
+
+
+def test_what_one_kernel_left_in_the_cache_says_nothing_of_another(tmp_path: Path) -> None:
+    env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"}
+    done = subprocess.run([sys.executable, "-c", ASKED], capture_output=True, text=True, env=env, check=False)
     assert done.returncode == 0, done.stderr

@@ -1,6 +1,6 @@
 """Numba for the few inner loops that numpy is too slow for: 16 x 16 matrices, 400 times a second and foot.
 
-The first start on a machine compiles them (``warm_up`` in foot_filter says so); later starts read the cache.
+The first start on a machine compiles them (a room's ``warm_up`` says so); later starts read the cache.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from typing import Any, TypeVar, cast
 import numba
 import platformdirs
 
+_ROOMS = ("camera", "fusion")
+"""Which have kernels."""
 _FEED_KERNELS = ("foot_filter_doubt.py", "foot_filter_events.py", "foot_filter_memory.py", "interface.py")
 """Files without kernels, whose constants are compiled into some."""
 
@@ -35,10 +37,14 @@ def compiled(function: F) -> F:
         config.CACHE_DIR = before
 
 
-def is_compiled() -> bool:
-    """Whether this machine has compiled kernels of this version before."""
-    config: Any = numba.config
-    return any(Path(config.CACHE_DIR or _CACHE).rglob("*.nbi"))
+def is_compiled(kernel: Callable[..., Any]) -> bool:
+    """Whether this machine has compiled this kernel of this version before, or never will (NUMBA_DISABLE_JIT)."""
+    if compiling_is_off():
+        return True
+    dispatcher: Any = kernel
+    function = dispatcher.py_func
+    index = f"{Path(function.__code__.co_filename).stem}.{function.__qualname__}-*.nbi"
+    return any(Path(dispatcher._cache.cache_path).glob(index))
 
 
 def compiling_is_off() -> bool:
@@ -49,9 +55,10 @@ def compiling_is_off() -> bool:
 
 def _cache_folder() -> str:
     # Numba renews a function's cache when its own file changes, but not when a constant or a function that it takes
-    # from another file does: so the cache is named by all files of this room that have or feed kernels.
+    # from another file does: so the cache is named by all files that have or feed kernels.
     digest = hashlib.sha256()
-    for file in sorted(Path(__file__).parent.glob("*.py")):
+    here = Path(__file__).parent
+    for file in sorted(file for room in _ROOMS for file in (here / room).glob("*.py")):
         text = file.read_bytes()
         if b"@compiled" in text or file.name in _FEED_KERNELS:
             digest.update(text)
