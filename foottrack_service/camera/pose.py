@@ -68,17 +68,18 @@ def solve_target(
         corners = np.concatenate([d.corners for d in seen])
         best_first = sorted(range(len(seen)), key=lambda i: -seen[i].side_px)
     rays = intrinsics.rays(corners)
-    fits: list[_Fit] = []
-    for i in best_first[:2]:
-        for fit in _fits(target, seen[i].id, rays[4 * i : 4 * i + 4], model, rays, intrinsics.focal):
-            if not any(_same(fit, other) for other in fits):
-                fits.append(fit)
-    if not fits:
+    found = [
+        fit
+        for i in best_first[:2]
+        for fit in _fits(target, seen[i].id, rays[4 * i : 4 * i + 4], model, rays, intrinsics.focal)
+    ]
+    if not found:
         return None
-    fits.sort(key=lambda fit: fit.squares)
-    first = fits[0]
+    found.sort(key=lambda fit: fit.squares)
+    first = found[0]
     floor = sigma_px**2 * len(rays)
-    second = next((fit for fit in fits[1:] if fit.squares < _WORSE**2 * (first.squares + floor)), None)
+    others = (fit for fit in found[1:] if not _same(fit, first))
+    second = next((fit for fit in others if fit.squares < _WORSE**2 * (first.squares + floor)), None)
     # A prior on the corners' noise, updated by this picture's own residuals: blur shows in them.
     variance = (_CONFIDENCE * sigma_px**2 + first.squares) / (_CONFIDENCE + 2 * len(rays) - 6)
     cov = first.cov * (variance / intrinsics.focal**2)

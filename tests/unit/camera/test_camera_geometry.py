@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from camera_scenes import RIG
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from foottrack_service import rotations
@@ -133,6 +133,7 @@ def random_pose(source: np.random.Generator, distance: float) -> tuple[np.ndarra
 
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10**6), st.floats(0.4, 2.5))
+@example(811, 0.4921875)  # both of IPPE's solutions end near the truth, the worse one first
 def test_exact_corners_give_the_exact_pose(seed: int, distance: float) -> None:
     source = np.random.default_rng(seed)
     p, q = random_pose(source, distance)
