@@ -23,9 +23,10 @@ from foottrack_service.bus.security import load_keys
 from foottrack_service.config import BusSettings
 from foottrack_service.curve_settings import CurveClient, CurveSettings, Role
 
-REASONS = ("key", "role", "not_encrypted", "service_key", "protocol")
+REASONS = ("key", "role", "not_encrypted", "service_key", "protocol", "handshake")
 """Why somebody is not let in: his key is not on the list, or not for this role; he speaks in the clear; he means
-another service; he speaks something else."""
+another service; he speaks something else; he left before he had said what he speaks. Who speaks in the clear learns
+from the first bytes that he should not, so he may be gone before libzmq has read his: then the last it is."""
 
 _ZAP = "inproc://zeromq.zap.01"
 """Where libzmq asks whether a client may come in: https://rfc.zeromq.org/spec/27/."""
@@ -162,9 +163,10 @@ class Doorkeeper:
             case zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL, value:
                 text = f"somebody who does not speak ZMTP's CURVE was not let in to {role} ({value:#x})"
                 self._refuse("protocol", text)
+            case _ if _port(event["endpoint"].decode()) == _port(self.endpoints[role]):
+                self._refuse("handshake", f"somebody left before he was let in to {role}: without encryption, perhaps")
             case _:
-                # Connections that end during the handshake; plain ones at other listeners of the socket are among them.
-                _log.debug("a connection to %s ended during its handshake", role)
+                _log.debug("a connection to the plain endpoint of %s ended during its handshake", role)
 
     def _refuse(self, reason: str, text: str) -> None:
         self.refused[reason] += 1
@@ -172,3 +174,8 @@ class Doorkeeper:
         if now - self._last_log >= _LOG_PERIOD_S:
             self._last_log = now
             _log.warning("%s", text)
+
+
+def _port(endpoint: str) -> str:
+    # Of the address alone: an event names the interface that somebody came in by, a listener may name all.
+    return endpoint.rpartition(":")[2]
