@@ -152,7 +152,7 @@ class Service:
 
     async def _open(self) -> None:
         self._failure = asyncio.get_running_loop().create_future()
-        self.bus = Bus.connect(self._broker.inproc, self._broker.context)
+        self.bus = Bus.connect(self._broker.inproc, self._broker.context, outside=self._broker.endpoints)
         if self._broker.doorkeeper is not None:
             self.bus.health.turned_away("door", self._broker.doorkeeper.refused)
         self._session = SessionInfo([self.settings.user], self.settings.digest)

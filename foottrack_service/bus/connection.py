@@ -27,8 +27,11 @@ class Bus:
     (``Bus.connect(broker.inproc, broker.context)``). ``health`` is the board of this process.
     """
 
-    def __init__(self, settings: BusSettings, context: Context, own_context: bool, clock: BusClock) -> None:
+    def __init__(
+        self, settings: BusSettings, outside: BusSettings, context: Context, own_context: bool, clock: BusClock
+    ) -> None:
         self.settings = settings
+        self.outside = outside
         self.context = context
         self.clock = clock
         self.health = HealthBoard()
@@ -37,12 +40,19 @@ class Bus:
         self._made: list[Publisher | Subscriber | ControlClient] = []
 
     @classmethod
-    def connect(cls, settings: BusSettings, context: Context | None = None, clock: BusClock = now) -> Self:
+    def connect(
+        cls,
+        settings: BusSettings,
+        context: Context | None = None,
+        clock: BusClock = now,
+        outside: BusSettings | None = None,
+    ) -> Self:
         """Never waits: what it makes has ``ready``. A ``SyncedClock`` that is not fresh makes messages invalid.
 
+        ``outside`` is where other processes of this host reach the same bus, if not at ``settings``.
         Raises KeyFileError where connections are to be encrypted.
         """
-        return cls(settings, context or zmq.Context(), context is None, clock)
+        return cls(settings, outside or settings, context or zmq.Context(), context is None, clock)
 
     def publisher(self, src: str) -> Publisher:
         """A source of messages called ``src``."""

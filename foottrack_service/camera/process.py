@@ -1,7 +1,8 @@
-"""The camera's own process: reads pictures, finds the feet, and tells the node through a pipe.
+"""The camera's own process: reads pictures, finds the feet, and publishes them.
 
 A process, because 4 ms of work in a thread would cost the IMU path 4 ms; spawned, because OpenCV's threads do not
-survive a fork.
+survive a fork. It publishes by itself, so that the service's process has none of its work; through a pipe the node
+hears how it goes.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import os
 import signal
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,17 +20,24 @@ from typing import Any
 
 import cv2
 
-from foottrack_protocol.messages import Optical, RawPicture
+from foottrack_protocol.errors import EncodeError
+from foottrack_protocol.messages import CameraPreview, Optical, RawPicture
+from foottrack_service.bus.connection import Bus
+from foottrack_service.bus.errors import BusError
+from foottrack_service.bus.publisher import Publisher
 from foottrack_service.camera import overlay, raw
 from foottrack_service.camera.frame import Frame, Source, SourceEnded, SourceError
 from foottrack_service.camera.marker_tracker import warm_up
 from foottrack_service.camera.setup import Trackers, open_source
 from foottrack_service.config import Settings
 
+SOURCE = "camera"
+"""Who publishes."""
 LATE_S = 0.1
 """A picture that is older than this when its feet are found is late."""
 DARK_GREY = 25.0
 PREVIEW_PERIOD_S = 0.2
+TALLY_PERIOD_S = 0.5
 _JUDGE_EVERY = 60
 _NICENESS = 10
 _BELOW_NORMAL_PRIORITY_CLASS = 0x4000
@@ -56,24 +65,25 @@ class Opened:
 
 
 @dataclass(frozen=True)
+class Tally:
+    """What became of the pictures since the start, by kind and by reason, and what was wrong since the last tally."""
+
+    good: Counter[str]
+    bad: Counter[str]
+    late: bool
+    dark: bool
+
+
+@dataclass(frozen=True)
 class Ended:
     """No more pictures; `error` says why, None when a recorded sequence is over."""
 
     error: str | None
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A picture itself, taken at `t`, while somebody asks for it."""
-
-    t: int
-    pieces: tuple[RawPicture, ...]
-
-
-Report = Opened | Fixes | Picture | Ended
+Report = Opened | Tally | Ended
 
 STOP = "stop"
-RAW_ON, RAW_OFF = "raw on", "raw off"
 """What the node tells the process."""
 
 
@@ -107,53 +117,107 @@ class Watcher:
                 found.append((f"{fix.kind}/{fix.side}", fix.t, fix.body()))
         return Fixes(tuple(found), frame.t, dropped, len(fixes) - len(found), late, self._dark, jpeg)
 
-    def picture(self, frame: Frame) -> Picture | None:
+    def picture(self, frame: Frame) -> tuple[RawPicture, ...]:
         """The picture itself, where one is due."""
         if self._shot is not None and 0 <= frame.t - self._shot < raw.PERIOD_S * 1e9:
-            return None
+            return ()
         self._shot = frame.t
-        return Picture(frame.t, raw.pieces(frame, self._trackers.rig.intrinsics))
+        return raw.pieces(frame, self._trackers.rig.intrinsics)
+
+
+class _Speaker:
+    """Publishes what was found, and counts it."""
+
+    def __init__(self, publisher: Publisher, user: str) -> None:
+        self._publisher, self._user = publisher, user
+        self._good: Counter[str] = Counter()
+        self._bad: Counter[str] = Counter()
+        self._late = self._dark = False
+
+    @property
+    def wants_pictures(self) -> bool:
+        """Whether somebody asks for the pictures themselves."""
+        return self._publisher.wanted(self._user, "raw/camera")
+
+    def say(self, report: Fixes) -> None:
+        """Publish a picture's fixes, and its preview."""
+        for stream, t, body in report.fixes:
+            self._publisher.publish(self._user, stream, t, body)
+            self._good[stream.partition("/")[0]] += 1
+        if report.jpeg is not None:
+            try:
+                self._publisher.publish(self._user, "camera/preview", report.t, CameraPreview(jpeg=report.jpeg))
+            except EncodeError:
+                self._bad["preview_too_large"] += 1
+        self._good["pictures"] += 1
+        self._bad.update(dropped=report.dropped, invalid=report.invalid, late=report.late)
+        self._late |= report.late
+        self._dark |= report.dark
+
+    def show(self, t: int, pieces: tuple[RawPicture, ...]) -> None:
+        """Publish a picture itself."""
+        for piece in pieces:
+            self._publisher.publish(self._user, "raw/camera", t, piece)
+
+    def tally(self) -> Tally:
+        """The counters now."""
+        told = Tally(+self._good, +self._bad, self._late, self._dark)
+        self._late = self._dark = False
+        return told
 
 
 def work(connection: Connection, settings: dict[str, Any]) -> None:
-    """The process's main: until told to stop, the source's end, or an error that is told first."""
+    """The process's main: until told to stop, the source's end, or an error that is told first.
+
+    ``settings.bus`` is where this process reaches the bus.
+    """
     # Ctrl-C reaches every process of the terminal; the node says when it is time.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _yield_to_others()
     # Pictures come one by one: OpenCV's threads would only take the other core from fusion.
     cv2.setNumThreads(1)
-    source: Source | None = None
+    error: str | None = None
     try:
         loaded = Settings(**settings)
         # Before pictures come, so that none is late for it.
         warm_up()
-        source = open_source(loaded, time.perf_counter_ns)
-        trackers = Trackers(loaded.camera, source.intrinsics)
-        connection.send(Opened())
-        watcher = Watcher(trackers, loaded.camera.source.preview, time.perf_counter_ns)
-        wants_raw = False
-        while True:
-            while connection.poll():
-                order = connection.recv()
-                if order == STOP:
-                    return
-                wants_raw = order == RAW_ON
-            frame = source.read()
-            connection.send(watcher.report(frame))
-            # After the fixes, which are waited for.
-            picture = watcher.picture(frame) if wants_raw else None
-            if picture is not None:
-                connection.send(picture)
+        with Bus.connect(loaded.bus) as bus:
+            publisher = bus.publisher(SOURCE)
+            publisher.wait_ready()
+            source = open_source(loaded, time.perf_counter_ns)
+            try:
+                _watch(connection, loaded, source, _Speaker(publisher, loaded.user))
+            finally:
+                source.close()
     except SourceEnded:
-        _tell(connection, Ended(None))
-    except (SourceError, ValueError) as error:
-        _tell(connection, Ended(str(error)))
-    except (BrokenPipeError, ConnectionError, EOFError):
         pass
+    except (SourceError, BusError, ValueError) as reason:
+        error = str(reason)
+    except (BrokenPipeError, ConnectionError, EOFError):
+        return
+    with suppress(OSError):
+        connection.send(Ended(error))
+    connection.close()
+
+
+def _watch(connection: Connection, settings: Settings, source: Source, speaker: _Speaker) -> None:
+    """Until told to stop. Raises SourceEnded, SourceError."""
+    trackers = Trackers(settings.camera, source.intrinsics)
+    watcher = Watcher(trackers, settings.camera.source.preview, time.perf_counter_ns)
+    connection.send(Opened())
+    told = time.perf_counter()
+    try:
+        while not connection.poll() or connection.recv() != STOP:
+            frame = source.read()
+            speaker.say(watcher.report(frame))
+            if speaker.wants_pictures:
+                # After the fixes, which are waited for.
+                speaker.show(frame.t, watcher.picture(frame))
+            if time.perf_counter() - told > TALLY_PERIOD_S:
+                told = time.perf_counter()
+                connection.send(speaker.tally())
     finally:
-        if source is not None:
-            source.close()
-        connection.close()
+        connection.send(speaker.tally())
 
 
 def _yield_to_others() -> None:
@@ -166,10 +230,3 @@ def _yield_to_others() -> None:
         kernel.SetPriorityClass(ctypes.c_void_p(kernel.GetCurrentProcess()), _BELOW_NORMAL_PRIORITY_CLASS)
     else:
         os.nice(_NICENESS)
-
-
-def _tell(connection: Connection, ended: Ended) -> None:
-    try:
-        connection.send(ended)
-    except OSError:
-        return

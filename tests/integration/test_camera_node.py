@@ -17,6 +17,7 @@ from foottrack_protocol import Message
 from foottrack_service import rotations
 from foottrack_service.bus import Bus
 from foottrack_service.camera import node
+from foottrack_service.camera.process import SOURCE
 from foottrack_service.config import CameraSettings, Settings
 
 Run = Callable[[Any], Any]
@@ -120,7 +121,7 @@ def test_a_killed_process_is_noticed(run: Run, bus: Bus, monkeypatch: pytest.Mon
 
     async def scenario() -> None:
         camera = asyncio.ensure_future(node.run(bus, settings(kind="rendered")))
-        await bus.health.wait_running(node.SOURCE)
+        await bus.health.wait_running(SOURCE)
         started[0][0].kill()
         with pytest.raises(node.CameraError, match="died"):
             await camera

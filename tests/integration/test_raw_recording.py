@@ -19,7 +19,7 @@ from foottrack_protocol import Message
 from foottrack_protocol import messages as m
 from foottrack_service.bus import Bus, Publisher
 from foottrack_service.camera import node as camera_node
-from foottrack_service.camera.process import Watcher
+from foottrack_service.camera.process import SOURCE, Watcher
 from foottrack_service.camera.setup import Trackers, open_source
 from foottrack_service.cli.log_raw import playing, unpack
 from foottrack_service.cli.running import CommandFailed
@@ -136,7 +136,7 @@ def test_pictures_are_found_the_same_at_a_desk(tmp_path: Path, bus: Bus, run: Ru
 
     async def scenario() -> None:
         camera = asyncio.create_task(camera_node.run(bus, settings))
-        await bus.health.wait_running(camera_node.SOURCE)
+        await bus.health.wait_running(SOURCE)
         async with recording(bus, settings, path):
             wanted = bus.subscriber(["user/raw/"])
             seen: Counter[int] = Counter()
