@@ -93,7 +93,10 @@ def test_a_recorded_sequence_ends_the_node_quietly(run: Run, bus: Bus, tmp_path:
     (tmp_path / "rgb.txt").write_text("\n".join(lines))
     given = settings(kind="folder", folder={"path": str(tmp_path)})
     run(node.run(bus, given))
-    assert bus.health.body().filters["user/camera"].accepted == {"pictures": 3}
+    counted = bus.health.body().filters["user/camera"]
+    # It plays at its own pace: a busy machine misses pictures, but none uncounted.
+    assert set(counted.accepted) == {"pictures"}
+    assert counted.accepted["pictures"] + counted.rejected.get("dropped", 0) == 3
 
 
 @pytest.mark.parametrize(
