@@ -66,6 +66,7 @@ class _Leg:
     """One leg of the avatar."""
 
     __slots__ = (
+        "aim",
         "down",
         "extra",
         "extra_rate",
@@ -89,6 +90,9 @@ class _Leg:
 
     def __init__(self) -> None:
         self.z = self.goal = self.rate = self.target = self.height = self.vy = self.pitch = 0.0
+        self.aim = 0.0
+        """Where the goal was when the foot last went after it, m: it goes on from there evenly, not at once. Frames are
+        of uneven length, and what is held or gripped for a whole one would show it."""
         self.extra = self.extra_rate = 0.0
         self.swinging = self.rising = False
         self.progress = self.share = 0.0
@@ -135,10 +139,10 @@ class _Leg:
     def along(self, foot: FootPhases, speed: float, dt: float, leg: float) -> None:
         """Go after the swing's goal, and along with the ground, which moves back at ``speed`` m/s."""
         parts = math.ceil(dt / _LONGEST_S)
-        for _ in range(parts):
-            self._go_along(foot, speed, dt / parts, leg)
+        for left in range(parts, 0, -1):
+            self._go_along(foot, speed, dt / parts, leg, left)
 
-    def _go_along(self, foot: FootPhases, speed: float, dt: float, leg: float) -> None:
+    def _go_along(self, foot: FootPhases, speed: float, dt: float, leg: float, parts_left: int) -> None:
         runs = _share((-self.z / leg - LEAVES) / (FARTHEST - LEAVES)) * min(1.0, speed / _RUNNING_SPEED)
         wanted = 1.0 - runs
         if foot.phase != "stance":
@@ -152,18 +156,20 @@ class _Leg:
         lift = _RUNNING_LIFT * runs
         stiffness = _LIFT_STIFFNESS if lift > self.extra else _SETTLE_STIFFNESS
         self.extra, self.extra_rate = _sprung(self.extra, self.extra_rate, lift, stiffness, dt)
-        change = dt / _GRIP_S
+        change, gripped = dt / _GRIP_S, _smooth(self.down)
         self.down += min(max(wanted - self.down, -change), change)
         # A drifting foot may be measured below the floor, which is no reason to hold it there.
         if max(0.0, foot.height) + self.extra < _DOWN:
             self.down = 1.0
         if self.down >= 1.0:
-            self.goal, self.rate = self.z, 0.0
-        grip = _smooth(self.down)
-        z, self.rate = _sprung(self.z, self.rate, self.goal, _STIFFNESS, dt)
+            self.goal, self.aim, self.rate = self.z, self.z, 0.0
+        grip = 0.5 * (gripped + _smooth(self.down))
+        moved = (self.goal - self.aim) / parts_left
+        z, self.rate = _sprung(self.z, self.rate, self.aim, _STIFFNESS, dt, moved)
         way = min(speed * dt * grip, max(0.0, self.z + _REACH * leg))
         self.z += (z - self.z) * (1.0 - grip) - way
         self.goal -= way
+        self.aim += moved - way
         self.target -= way
 
 
@@ -230,11 +236,18 @@ class WalkingLegs:
             self._returning = None
 
 
-def _sprung(at: float, rate: float, goal: float, stiffness: float, dt: float) -> tuple[float, float]:
-    """The exact step of a critically damped spring: place and rate after ``dt`` s; ``stiffness`` 1/s."""
-    gap, fade = at - goal, math.exp(-stiffness * dt)
-    pull = (rate + stiffness * gap) * dt
-    return goal + (gap + pull) * fade, (rate - stiffness * pull) * fade
+def _sprung(
+    at: float, rate: float, goal: float, stiffness: float, dt: float, moved: float = 0.0
+) -> tuple[float, float]:
+    """The exact step of a critically damped spring: place and rate after ``dt`` s; ``stiffness`` 1/s.
+
+    Its goal moves meanwhile, evenly, by ``moved``: what follows a goal that moves stays behind by 2 pace / stiffness.
+    """
+    pace = moved / dt
+    follows = goal - 2.0 * pace / stiffness
+    gap, fade = at - follows, math.exp(-stiffness * dt)
+    pull = (rate - pace + stiffness * gap) * dt
+    return follows + moved + (gap + pull) * fade, pace + (rate - pace - stiffness * pull) * fade
 
 
 def _share(share: float) -> float:
