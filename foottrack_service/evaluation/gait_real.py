@@ -81,10 +81,11 @@ def quest_cadence(file: Path) -> list[tuple[float, float] | None]:
     ]
     run = run_gait(instants, Settings())
     steps = np.sort(np.concatenate([_times(run, side, "toe_off") for side in SIDES]))
+    bobs, rate = bobs_of(trace.t, trace.p[:, 1])
     pairs: list[tuple[float, float] | None] = []
     for begin in np.arange(0.0, trace.t[-1] - _WINDOW_S, 0.5 * _WINDOW_S):
         window = (trace.t >= begin) & (trace.t < begin + _WINDOW_S)
-        bob = _bob_hz(trace.t[window], trace.p[window, 1])
+        bob = bob_hz(bobs[window], rate)
         inside = steps[(steps >= begin) & (steps < begin + _WINDOW_S)]
         # The median: somebody who paused within the window did not step more slowly.
         pace = 1.0 / float(np.median(np.diff(inside))) if len(inside) > 2 else 0.0
@@ -151,12 +152,19 @@ def _swings(heel: Array) -> Array:
     return np.asarray(ends[ends - begins > _LEAST_SWING_S])
 
 
-def _bob_hz(t: Array, height: Array) -> float | None:
-    """Frequency of a steady bob by its autocorrelation, refined by a parabola; None where it is not steady."""
-    rate = (len(t) - 1) / (t[-1] - t[0])
+def bobs_of(t: Array, height: Array) -> tuple[Array, float]:
+    """What is left of a head's height (n,) m without its slow movements, and samples per s.
+
+    Of the whole trace: of a window alone, half a second at both of its ends would have none of its neighbours.
+    """
+    rate = float((len(t) - 1) / (t[-1] - t[0]))
     width = 2 * round(0.5 * _SLOW_S * rate) + 1
     slow = np.convolve(np.pad(height, width // 2, mode="edge"), np.ones(width) / width, "valid")
-    y = height - slow
+    return height - slow, rate
+
+
+def bob_hz(y: Array, rate: float) -> float | None:
+    """Frequency of a steady bob by its autocorrelation, refined by a parabola; None where it is not steady."""
     own = np.correlate(y, y, "full")[len(y) - 1 :] / np.arange(len(y), 0, -1)
     low, high = int(rate / 3.2), int(rate / 1.3)
     best = low + int(np.argmax(own[low:high]))

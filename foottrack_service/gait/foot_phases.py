@@ -28,11 +28,11 @@ _STRIDE = 0.12
 """m: toes that have gone so far over the floor make a step, however low."""
 _ONSET_SPEED = 0.05
 """m/s, upwards: slower is no lift."""
-_SMOOTH, _LOW_POINT = 1.6, 2.1
+_SMOOTH, _LOW_POINT = 1.6, 2.2
 """How movements begin: the heel's rise between a line and a parabola, the toes', which roll off, smoother."""
 _LIFT_SPEED = 0.12
 """m/s, upwards, of the lowest point: a sole that rolls over its toes seems to rise more slowly."""
-_LONGEST_ONSET_S = 0.12
+_LONGEST_ONSET_S = 0.2
 _LEAST_STEP, _MOST_STEP = 0.018, 0.04
 """m: a foot that has risen by so much steps; in between by the person's own peaks."""
 _STEP_SHARE = 0.25
@@ -75,6 +75,11 @@ class FootPhases:
 
     def __init__(self, shoe: Shoe) -> None:
         self._shoe = shoe
+        # The forefoot rolls over an arc that leaves the flat sole at the ball and ends at the toes' tip.
+        rise, run = shoe.ankle_height - shoe.toe_below, (1.0 - _BALL_SHARE) * shoe.toe_ahead
+        self._radius = 0.5 * (rise * rise + run * run) / rise if rise > 0.0 else 0.0
+        self._steepest = run / self._radius if rise > 0.0 else 0.0
+        """Sine of the pitch from which on the foot stands on the tip; 0 for a sole without toe spring."""
         self.peak = 0.0
         """Running mean of the peaks of swings, m; 0 before the first."""
         self.swing_s = 0.0
@@ -155,17 +160,21 @@ class FootPhases:
         if self.phase == "stance":
             self._stand(t, dt, foot, along, risen, slid)
         else:
-            self.height += risen + _PLACE_RATE * dt * (foot.p[1] - (self._floor or 0.0) - self.height)
+            self.height += risen
+            self.height += _PLACE_RATE * dt * (foot.p[1] - (self._floor or 0.0) - self.height)
             self.lift = max(0.0, self.height + low)
             self._swing(t, dt, foot, vy_before, before)
 
     def _points(self, along: float, up: float) -> tuple[float, float]:
         """How far heel and lowest point are above where they are, below the ankle, of a level foot, m."""
-        shoe = self._shoe
+        shoe, radius, steepest = self._shoe, self._radius, self._steepest
         heel = -shoe.ankle_height * up + _HEEL_BEHIND * along
-        ball = -shoe.ankle_height * up - _BALL_SHARE * shoe.toe_ahead * along
-        tip = -shoe.toe_below * up - shoe.toe_ahead * along
-        return heel + shoe.ankle_height, min(heel, ball, tip) + max(shoe.ankle_height, shoe.toe_below)
+        if 0.0 < along < steepest:
+            front = (radius - shoe.ankle_height) * up - _BALL_SHARE * shoe.toe_ahead * along - radius
+        else:
+            ball = -shoe.ankle_height * up - _BALL_SHARE * shoe.toe_ahead * along
+            front = min(ball, -shoe.toe_below * up - shoe.toe_ahead * along)
+        return heel + shoe.ankle_height, min(heel, front) + max(shoe.ankle_height, shoe.toe_below)
 
     def _stand(
         self, t: int, dt: float, foot: FootSample, along: float, risen: float, slid: tuple[float, float]
@@ -174,7 +183,6 @@ class FootPhases:
         quiet = foot.contact and vx * vx + vy * vy + vz * vz < _QUIET_SPEED**2
         keep = 1.0 - min(1.0, dt / (_FLAT_S if quiet else _HEEL_UP_S))
         self.height = (self.height + risen) * keep
-        heel_before, lift_before = self._heel, self.lift
         self._heel = self.height + self._heel_rel
         low = self.height + self._low_rel
         self._lowest = min(0.0, low, self._lowest * keep)
@@ -193,12 +201,12 @@ class FootPhases:
             return
         if self._heel_off_ns is None:
             if self._heel > _HEEL_RISE and self._heel_speed > _ONSET_SPEED:
-                self._heel_off_ns = _onset(t, dt, heel_before, self._heel, _HEEL_RISE, self._heel_speed)
+                self._heel_off_ns = _onset(t, self._heel, self._heel_speed)
         elif self._heel < 0.4 * _HEEL_RISE:
             self._heel_off_ns = None
         if self._off_ns is None:
             if self.lift > _TOE_RISE and self._low_speed > _LIFT_SPEED:
-                self._off_ns = _onset(t, dt, lift_before, self.lift, _TOE_RISE, self._low_speed, _LOW_POINT)
+                self._off_ns = _onset(t, self.lift, self._low_speed, _LOW_POINT)
         elif self.lift < 0.6 * _TOE_RISE and not self._slides:
             self._off_ns = None
         self._slip(t, dt, slid)
@@ -207,13 +215,12 @@ class FootPhases:
 
     def _slip(self, t: int, dt: float, slid: tuple[float, float]) -> None:
         """A foot that swings low drags its toes along: they have left, though they hardly rise."""
-        before = math.hypot(*self._slide)
         self._slide = (self._slide[0] + slid[0], self._slide[1] + slid[1])
         gone = math.hypot(*self._slide)
         speed = math.hypot(*slid) / dt
         if self._off_ns is None and gone > _SLIDE and speed > _SLIDE_SPEED:
             self._slides = True
-            self._off_ns = _onset(t, dt, min(before, _SLIDE), gone, _SLIDE, speed)
+            self._off_ns = _onset(t, gone, speed)
 
     @property
     def step_height(self) -> float:
@@ -221,6 +228,7 @@ class FootPhases:
         return min(max(_STEP_SHARE * self.peak, _LEAST_STEP), _MOST_STEP)
 
     def _leave(self, off: int) -> None:
+        off = off if self.strike_ns is None else max(off, self.strike_ns)
         heel_off = off if self._heel_off_ns is None else min(self._heel_off_ns, off)
         if self.strike_ns is not None:
             stance = (off - self.strike_ns) * 1e-9
@@ -287,8 +295,6 @@ class FootPhases:
         self._slide = (0.0, 0.0)
 
 
-def _onset(t: int, dt: float, before: float, now: float, threshold: float, speed: float, power: float = _SMOOTH) -> int:
-    """When a rise began that crossed a threshold (m) with this speed, m/s: it began like time to the ``power``."""
-    crossed = dt * (now - threshold) / max(now - before, 1e-9)
-    begun = min(power * threshold / speed, _LONGEST_ONSET_S)
-    return t - round(1e9 * (crossed + begun))
+def _onset(t: int, risen: float, speed: float, power: float = _SMOOTH) -> int:
+    """When a rise by ``risen`` m, going on with this speed, m/s, began: it went like time to the ``power``."""
+    return t - round(1e9 * min(power * risen / speed, _LONGEST_ONSET_S))

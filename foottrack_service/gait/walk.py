@@ -57,6 +57,8 @@ _STIFFNESS = 55.0
 """1/s: how tightly a foot in the air follows its goal. Low steps make much way of little height, and of its noise."""
 _FOUND_SPEED = 0.3
 """m/s: a foot whose height changes by so much more than its speed explains was not moved, but found elsewhere."""
+_HARDEST_LANDING = 100.0
+"""m/s^2, upwards: no foot comes to rest on the floor more suddenly."""
 _TURN_RATE = 20.0
 """rad/s: no ankle turns faster."""
 _HALF_PI: Final = 0.5 * math.pi
@@ -85,6 +87,7 @@ class _Leg:
         "target",
         "top",
         "vy",
+        "y",
         "z",
     )
 
@@ -94,6 +97,8 @@ class _Leg:
         """Where the goal was when the foot last went after it, m: it goes on from there evenly, not at once. Frames are
         of uneven length, and what is held or gripped for a whole one would show it."""
         self.extra = self.extra_rate = 0.0
+        self.y = 0.0
+        """What is shown of the height, m."""
         self.swinging = self.rising = False
         self.progress = self.share = 0.0
         self.start = self.peak = self.top = 0.0
@@ -113,10 +118,10 @@ class _Leg:
             self.rising, self.share = False, self.progress
             self.top, self.target = max(foot.apex, 0.01), plan
         if self.rising:
-            share = min(max((height - self.start) / (self.peak - self.start), 0.0), 1.0)
+            share = _share((height - self.start) / (self.peak - self.start))
             progress = 0.5 * (1.0 - math.cos(_HALF_PI * share))
         else:
-            share = min(max(height / self.top, 0.0), 1.0)
+            share = _share(height / self.top)
             progress = self.share + (1.0 - self.share) * math.cos(_HALF_PI * share)
         if progress > self.progress:
             left = 1.0 - self.progress
@@ -131,10 +136,11 @@ class _Leg:
         self.height, self.vy = height, foot.vy
         self.pitch += min(max(foot.pitch - self.pitch, -_TURN_RATE * dt), _TURN_RATE * dt)
 
-    @property
-    def shown(self) -> LegTarget:
-        """The target."""
-        return LegTarget(self.z, max(0.0, self.height + self.extra), self.pitch)
+    def show(self, dt: float) -> LegTarget:
+        """The target. A landing that is measured below the floor does not end there at once: the foot brakes before."""
+        braked = max(0.0, math.sqrt(self.y) - math.sqrt(0.5 * _HARDEST_LANDING) * dt)
+        self.y = max(self.height + self.extra, braked * braked)
+        return LegTarget(self.z, self.y, self.pitch)
 
     def along(self, foot: FootPhases, speed: float, dt: float, leg: float) -> None:
         """Go after the swing's goal, and along with the ground, which moves back at ``speed`` m/s."""
@@ -200,7 +206,7 @@ class WalkingLegs:
                 leg.swinging = False
             leg.along(foot, speed, dt, self._leg)
         self._return(t, dt, feet, steps)
-        left, right = (leg.shown for leg in self._legs)
+        left, right = (leg.show(dt) for leg in self._legs)
         drop = pelvis_drop(self._leg, left.z, right.z)
         return LegTargets(left, right, -drop, speed, steps.walking or speed > 0.0)
 
@@ -261,5 +267,5 @@ def _smooth(share: float) -> float:
 
 def _carried(share: float) -> float:
     """How much of its way a returning foot has gone: it is lifted first, and set down last."""
-    s = min(max((share - 0.2) / 0.6, 0.0), 1.0)
+    s = _share((share - 0.2) / 0.6)
     return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)

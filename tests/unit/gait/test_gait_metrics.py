@@ -5,6 +5,7 @@ import pytest
 
 from foottrack_service.evaluation.gait_cases import HELD_OUT_SEED, cases
 from foottrack_service.evaluation.gait_metrics import correlation_and_lag, jumps_m, match, skates_m
+from foottrack_service.evaluation.gait_real import bob_hz, bobs_of
 
 T = np.arange(0.0, 10.0, 0.005)
 
@@ -60,6 +61,19 @@ def test_lag_and_correlation():
     assert lag == pytest.approx(0.03, abs=0.001)
     assert r == pytest.approx(np.cos(2 * np.pi * 0.03), abs=0.01)
     assert correlation_and_lag(T, np.zeros(len(T)), user) is None
+
+
+@pytest.mark.parametrize("hz", [1.9, 2.1, 2.3])
+def test_a_bob_s_frequency_whatever_is_slow_beside_it(hz):
+    """Windows of 4 s of a head that bobs by 8 to 3 cm, sinks, rises, and pauses for 1 s."""
+    t = np.arange(0.0, 20.0, 1.0 / 72.0)
+    drift = np.interp(t, [0.0, 5.0, 7.0, 12.0, 20.0], [0.0, 0.05, -0.02, 0.03, 0.0])
+    bobs, rate = bobs_of(t, 1.7 + drift + (0.04 - 0.00125 * t) * np.cos(2 * np.pi * hz * t) * ((t < 9) | (t > 10)))
+    found = [bob_hz(bobs[(t >= begin) & (t < begin + 4.0)], rate) for begin in range(0, 16, 2)]
+    assert rate == pytest.approx(72.0)
+    assert [f for f in found if f is not None] == pytest.approx([hz] * sum(f is not None for f in found), abs=0.015)
+    assert sum(f is not None for f in found) >= 6
+    assert bob_hz(np.random.default_rng(0).normal(0.0, 0.01, 288), rate) is None
 
 
 def test_every_cadence_meets_every_peak_on_seeds_that_nothing_was_tuned_on():
