@@ -35,6 +35,8 @@ class Runtime:
         self.events: list[int] = []
         self.told: list[str] = []
         self.running = True
+        self.nameless: int | None = None
+        """A device that is gone when it is asked for its name."""
 
     def init(self, application: int) -> Runtime:
         assert application == self.VRApplication_Background
@@ -79,6 +81,8 @@ class Runtime:
 
     def getStringTrackedDeviceProperty(self, index: int, prop: int) -> str:
         assert prop == self.Prop_SerialNumber_String
+        if index == self.nameless:
+            raise OpenVRError
         return self.devices[index][0]
 
 

@@ -57,8 +57,8 @@ class _Head:
             self.publisher.publish(self._user, "head/pose", message.t, message.body)
 
     def take(self, polled: Polled) -> None:
-        if polled.recentred is not None:
-            self.stream.recentred(polled.recentred.moved)
+        for change in polled.recentred:
+            self.stream.recentred(change.moved)
         if polled.head is None:
             self.publish(self.stream.lost(polled.t))
         else:

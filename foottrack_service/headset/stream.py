@@ -42,7 +42,7 @@ class HeadStream:
         self._origin = 0
         self._last: tuple[int, Rigid] | None = None
         self._suspect: tuple[int, Rigid] | None = None
-        self._recentred: Pose | None = None
+        self._moves: list[Rigid | None] = []
         self._skip_check = False
 
     @property
@@ -63,13 +63,14 @@ class HeadStream:
                 self._suspect = (t, head)
                 self.drops["glitch"] += 1
                 return self._untracked(t)
-        moved, self._recentred = self._recentred, None
-        self._skip_check, self._suspect = False, None
+        p, q = _tuple(head.p), _tuple(head.q)
         try:
-            body = HeadPose(p=_tuple(head.p), q=_tuple(head.q), tracked=True, origin=self._origin, moved=moved)
+            body = HeadPose(p=p, q=q, tracked=True, origin=self._origin, moved=self._moved())
         except ValidationError:
             self.drops["wire"] += 1
             return None
+        self._moves.clear()
+        self._skip_check, self._suspect = False, None
         self._last = (t, head)
         self.taken["poses"] += 1
         return HeadMessage(t, body)
@@ -80,10 +81,14 @@ class HeadStream:
         return self._untracked(t)
 
     def recentred(self, moved: Rigid | None) -> None:
-        """The source says that its stage is another one from the next pose on; ``moved`` old stage to new, if known."""
+        """The source says that its stage is another one from now on; ``moved`` old stage to new, if known.
+
+        The next message tells it, whether the head is tracked or not: whoever hears of a new origin without it
+        acquires anew.
+        """
         self._origin += 1
         self._skip_check = True
-        self._recentred = None if moved is None else Pose(p=_tuple(moved.p), q=_tuple(moved.q))
+        self._moves.append(moved)
         self.taken["recentred"] += 1
 
     def silent(self, now: int) -> bool:
@@ -92,7 +97,18 @@ class HeadStream:
 
     def _untracked(self, t: int) -> HeadMessage:
         self.taken["untracked"] += 1
-        return HeadMessage(t, HeadPose(tracked=False, origin=self._origin))
+        body = HeadPose(tracked=False, origin=self._origin, moved=self._moved())
+        self._moves.clear()
+        return HeadMessage(t, body)
+
+    def _moved(self) -> Pose | None:
+        """All that nobody was told yet, as one movement; None when a part of it is not known."""
+        whole: Rigid | None = None
+        for moved in self._moves:
+            if moved is None:
+                return None
+            whole = moved if whole is None else moved.then(whole)
+        return None if whole is None else Pose(p=_tuple(whole.p), q=_tuple(whole.q))
 
 
 def _way_s(a: Rigid, b: Rigid) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 from types import ModuleType
 from typing import Any
 
@@ -44,6 +45,7 @@ class OpenVrSource:
         except self._openvr.error_code.OpenVRError as error:
             raise HeadsetError(f"SteamVR does not answer ({type(error).__name__}): is it running?") from None
         self._devices: dict[str, int] = {}
+        self._missing: set[str] = set()
         self._looked: int | None = None
         self._standing: Rigid | None = None
 
@@ -62,9 +64,9 @@ class OpenVrSource:
             tracker = None if index is None else self._pose(poses[index])
             if tracker is not None:
                 truth[side] = tracker.then(ankle)
-        recentred = None
+        recentred = []
         if self._standing is not None and not _same(standing, self._standing):
-            recentred = Recentred(standing.then(self._standing.inverse()))
+            recentred.append(Recentred(standing.then(self._standing.inverse())))
         self._standing = standing
         head = self._pose(poses[self._openvr.k_unTrackedDeviceIndex_Hmd])
         return Polled(t, head, recentred, truth)
@@ -74,22 +76,31 @@ class OpenVrSource:
         self._openvr.shutdown()
 
     def _ask(self) -> tuple[Rigid, Any]:
-        """How the standing universe lies in the driver's, and poses in that very one."""
+        """How the standing universe lies in the driver's, and poses in that very one. Raises HeadsetError."""
         vr = self._openvr
-        standing = place_of(self._system.getRawZeroPoseToStandingAbsoluteTrackingPose())
+        standing = self._standing_place()
         while True:
             poses = self._system.getDeviceToAbsoluteTrackingPose(vr.TrackingUniverseStanding, 0.0, None)
-            after = place_of(self._system.getRawZeroPoseToStandingAbsoluteTrackingPose())
+            after = self._standing_place()
             if _same(standing, after):
                 return standing, poses
             standing = after
+
+    def _standing_place(self) -> Rigid:
+        try:
+            return place_of(self._system.getRawZeroPoseToStandingAbsoluteTrackingPose())
+        except ValueError:
+            raise HeadsetError("SteamVR has no place for its standing universe: run its room setup") from None
 
     def _pose(self, pose: Any) -> Rigid | None:
         """None for what is not tracked: out of range the runtime repeats the last place or makes one up."""
         good = pose.bDeviceIsConnected and pose.bPoseIsValid
         if not good or pose.eTrackingResult != self._openvr.TrackingResult_Running_OK:
             return None
-        return place_of(pose.mDeviceToAbsoluteTracking)
+        try:
+            return place_of(pose.mDeviceToAbsoluteTracking)
+        except ValueError:
+            return None
 
     def _hear(self) -> None:
         event = self._openvr.VREvent_t()
@@ -103,18 +114,22 @@ class OpenVrSource:
         found: dict[str, int] = {}
         for index in range(vr.k_unMaxTrackedDeviceCount):
             if self._system.isTrackedDeviceConnected(index):
-                serial = self._system.getStringTrackedDeviceProperty(index, vr.Prop_SerialNumber_String)
-                found[serial] = index
-        for serial, _ in self._wanted.values():
-            if serial not in found and (serial in self._devices or not self._devices):
-                _log.warning("no device %s; there are: %s", serial, ", ".join(sorted(found)) or "none")
-        self._devices = found
+                # It may go between the two calls.
+                with suppress(vr.error_code.OpenVRError):
+                    found[self._system.getStringTrackedDeviceProperty(index, vr.Prop_SerialNumber_String)] = index
+        missing = {serial for serial, _ in self._wanted.values() if serial not in found}
+        for serial in sorted(missing - self._missing):
+            _log.warning("no device %s; there are: %s", serial, ", ".join(sorted(found)) or "none")
+        self._devices, self._missing = found, missing
 
 
 def place_of(matrix: Any) -> Rigid:
-    """An HmdMatrix34_t: rotation and place, right-handed, +Y up, -Z forward, as the wire has them."""
+    """An HmdMatrix34_t: rotation and place, right-handed, +Y up, -Z forward, as the wire has them.
+
+    Raises ValueError where it is neither.
+    """
     m = np.array([[matrix.m[row][column] for column in range(4)] for row in range(3)], dtype=np.float64)
-    return Rigid(m[:, 3].copy(), rotations.from_matrix(m[:, :3]))
+    return rigid(m[:, 3], rotations.from_matrix(m[:, :3]))
 
 
 def _same(a: Rigid, b: Rigid) -> bool:

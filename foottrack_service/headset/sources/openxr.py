@@ -65,9 +65,9 @@ class OpenXrSource:
             found = xr.locate_space(self._view, self._stage, at)
         except xr.exception.XrException as error:
             raise HeadsetError(f"the OpenXR runtime is gone: {type(error).__name__}") from None
-        recentred = None
+        recentred = []
         while self._changes and self._changes[0][0] <= at:
-            recentred = self._changes.pop(0)[1]
+            recentred.append(self._changes.pop(0)[1])
         return Polled(t, self._head(found), recentred)
 
     def close(self) -> None:
@@ -93,7 +93,7 @@ class OpenXrSource:
         wanted = flag.ORIENTATION_VALID_BIT | flag.POSITION_VALID_BIT
         if not self._inferred:
             wanted |= flag.ORIENTATION_TRACKED_BIT | flag.POSITION_TRACKED_BIT
-        return place_of(found.pose) if found.location_flags & wanted == wanted else None
+        return _place(found.pose) if found.location_flags & wanted == wanted else None
 
     def _hear(self) -> None:
         xr = self._xr
@@ -123,14 +123,17 @@ class OpenXrSource:
 
     def _on_change(self, event: Any) -> None:
         if event.reference_space_type == self._xr.ReferenceSpaceType.STAGE:
-            moved = place_of(event.pose_in_previous_space).inverse() if event.pose_valid else None
-            self._changes.append((int(event.change_time), Recentred(moved)))
+            old = _place(event.pose_in_previous_space) if event.pose_valid else None
+            self._changes.append((int(event.change_time), Recentred(None if old is None else old.inverse())))
 
 
-def place_of(pose: Any) -> Rigid:
-    """An XrPosef, whose axes are the wire's."""
+def _place(pose: Any) -> Rigid | None:
+    """An XrPosef, whose axes are the wire's; None for one that a runtime says is valid and is not."""
     p, q = pose.position, pose.orientation
-    return rigid((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
+    try:
+        return rigid((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
+    except ValueError:
+        return None
 
 
 def _as(event: Any, kind: Any) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -23,11 +23,12 @@ class Recentred:
 
 @dataclass(frozen=True)
 class Polled:
-    """One answer. ``t`` bus clock, ns; ``head`` to stage, None when not tracked; ``truth`` has the feet's ankles."""
+    """One answer. ``t`` bus clock, ns; ``head`` to stage, None when not tracked; ``recentred`` since the last answer,
+    oldest first; ``truth`` has the feet's ankles."""
 
     t: int
     head: Rigid | None
-    recentred: Recentred | None = None
+    recentred: Sequence[Recentred] = ()
     truth: Mapping[Side, Rigid] = field(default_factory=dict)
 
 

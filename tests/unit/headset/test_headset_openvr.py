@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import count
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from openvr_double import OUT_OF_RANGE, RUNNING_OK, Runtime
 
 from foottrack_service import rotations
-from foottrack_service.headset.rigid import rigid
+from foottrack_service.headset.rigid import Rigid, rigid
 from foottrack_service.headset.settings import OpenVrSettings, RigidSettings
 from foottrack_service.headset.sources.openvr import OpenVrSource, place_of
 from foottrack_service.headset.sources.polled import HeadsetError
@@ -29,7 +30,7 @@ def test_the_head_is_where_the_matrix_says_at_the_middle_of_the_call() -> None:
     source = opened(Runtime(("hmd", HEAD, RUNNING_OK)))
     polled = source.poll()
     assert polled.t == STEP_NS // 2
-    assert polled.head is not None and polled.recentred is None
+    assert polled.head is not None and not polled.recentred
     np.testing.assert_allclose(polled.head.p, HEAD.p)
     assert rotations.angle_between(polled.head.q, HEAD.q) < 1e-7
 
@@ -48,14 +49,16 @@ def test_a_recentred_stage_moves_everything_by_what_is_told() -> None:
     stream.pose(before.t, before.head)
     runtime.standing = rigid((-1.0, 0.0, 2.0), rotations.from_yaw(-0.7))
     after = source.poll()
-    assert after.head is not None and after.recentred is not None and after.recentred.moved is not None
-    carried = after.recentred.moved.then(before.head)
+    assert after.head is not None
+    (change,) = after.recentred
+    assert change.moved is not None
+    carried = change.moved.then(before.head)
     np.testing.assert_allclose(carried.p, after.head.p, atol=1e-9)
     assert rotations.angle_between(carried.q, after.head.q) < 1e-6
-    stream.recentred(after.recentred.moved)
+    stream.recentred(change.moved)
     message = stream.pose(after.t, after.head)
     assert message is not None and message.body.tracked and message.body.origin == 1
-    assert source.poll().recentred is None
+    assert not source.poll().recentred
 
 
 def test_trackers_on_the_feet_are_truth() -> None:
@@ -73,6 +76,31 @@ def test_a_tracker_that_is_switched_on_later_is_found() -> None:
     assert not source.poll().truth
     runtime.devices.append(("LHR-C", FOOT, RUNNING_OK))
     assert any(source.poll().truth for _ in range(200))
+
+
+@pytest.mark.parametrize("broken", [(math.nan, 1.6, 0.0), (0.0, 1.6, math.inf)])
+def test_a_driver_that_says_nonsense_is_not_tracked_and_stops_nothing(broken: tuple[float, float, float]) -> None:
+    nonsense = Rigid(np.array(broken), HEAD.q)
+    runtime = Runtime(("hmd", nonsense, RUNNING_OK), ("LHR-A", Rigid(HEAD.p, np.full(4, math.nan)), RUNNING_OK))
+    source = opened(runtime, OpenVrSettings(truth_left="LHR-A"))
+    polled = source.poll()
+    assert polled.head is None and not polled.truth
+    runtime.devices[0] = ("hmd", HEAD, RUNNING_OK)
+    assert source.poll().head is not None
+
+
+def test_a_device_that_goes_while_it_is_asked_for_its_name_stops_nothing() -> None:
+    runtime = Runtime(("hmd", HEAD, RUNNING_OK), ("LHR-A", FOOT, RUNNING_OK))
+    runtime.nameless = 0
+    polled = opened(runtime, OpenVrSettings(truth_left="LHR-A")).poll()
+    assert polled.head is not None and set(polled.truth) == {"left"}
+
+
+def test_a_tracker_that_is_not_there_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
+    source = opened(Runtime(), OpenVrSettings(truth_left="LHR-A"))
+    for _ in range(400):
+        source.poll()
+    assert [record.getMessage() for record in caplog.records] == ["no device LHR-A; there are: none"]
 
 
 def test_without_steamvr_it_says_what_to_do() -> None:

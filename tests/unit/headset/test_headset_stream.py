@@ -63,12 +63,11 @@ def test_after_a_long_hole_a_head_may_be_anywhere() -> None:
     assert message is not None and message.body.tracked and message.body.origin == 0
 
 
-def test_a_known_recentring_is_told_once_with_the_first_pose() -> None:
+def test_a_known_recentring_is_told_once_with_the_first_message() -> None:
     stream = HeadStream()
     stream.pose(0, at(0.0))
     moved = rigid((1.0, 0.0, 2.0), rotations.from_yaw(0.5))
     stream.recentred(moved)
-    assert stream.lost(5 * MS).body.moved is None
     first = stream.pose(11 * MS, moved.then(at(0.0)))
     second = stream.pose(22 * MS, moved.then(at(0.0)))
     assert first is not None and second is not None
@@ -76,6 +75,43 @@ def test_a_known_recentring_is_told_once_with_the_first_pose() -> None:
     assert first.body.moved is not None and second.body.moved is None
     np.testing.assert_allclose(first.body.moved.p, (1.0, 0.0, 2.0))
     np.testing.assert_allclose(first.body.moved.q, rotations.from_yaw(0.5))
+
+
+def test_a_recentring_while_the_head_is_lost_is_told_at_once_for_a_new_origin_alone_means_acquire_anew() -> None:
+    stream = HeadStream()
+    stream.pose(0, at(0.0))
+    moved = rigid((1.0, 0.0, 2.0), rotations.from_yaw(0.5))
+    stream.recentred(moved)
+    lost, again = stream.lost(5 * MS), stream.pose(11 * MS, moved.then(at(0.0)))
+    assert again is not None and again.body.tracked
+    assert lost.body.origin == again.body.origin == 1
+    assert lost.body.moved is not None and again.body.moved is None
+    np.testing.assert_allclose(lost.body.moved.p, (1.0, 0.0, 2.0))
+
+
+def test_two_recentrings_before_a_message_are_one_movement_unless_one_is_unknown() -> None:
+    first, second = rigid((1.0, 0.0, 2.0), rotations.from_yaw(0.5)), rigid((0.0, 0.0, -1.0), rotations.from_yaw(1.0))
+    stream = HeadStream()
+    stream.pose(0, at(0.0))
+    stream.recentred(first)
+    stream.recentred(second)
+    told = stream.pose(11 * MS, second.then(first.then(at(0.0))))
+    assert told is not None and told.body.origin == 2 and told.body.moved is not None
+    where = rigid(told.body.moved.p, told.body.moved.q).then(at(0.3))
+    np.testing.assert_allclose(where.p, second.then(first.then(at(0.3))).p)
+    stream.recentred(None)
+    stream.recentred(first)
+    unknown = stream.pose(22 * MS, at(0.0))
+    assert unknown is not None and unknown.body.tracked and unknown.body.moved is None
+
+
+def test_a_recentring_outlives_a_pose_that_the_wire_refuses() -> None:
+    stream = HeadStream()
+    stream.pose(0, at(0.0))
+    stream.recentred(at(0.0))
+    assert stream.pose(11 * MS, Rigid(np.array([math.nan, 1.6, 0.0]), UP)) is None
+    told = stream.pose(22 * MS, at(2.0))
+    assert told is not None and told.body.tracked and told.body.moved is not None
 
 
 def test_what_is_old_or_no_place_is_left_out() -> None:
