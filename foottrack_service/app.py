@@ -15,6 +15,7 @@ from foottrack_service.bridges import node as bridges_node
 from foottrack_service.bus.broker import Broker
 from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.control import ControlServer
+from foottrack_service.bus.errors import NodeFailed
 from foottrack_service.bus.health import publish_health
 from foottrack_service.bus.log import BusLogHandler
 from foottrack_service.bus.session import SessionInfo, publish_session
@@ -35,10 +36,6 @@ FIRST_BACKOFF_S = 0.5
 LONGEST_BACKOFF_S = 10.0
 
 _log = logging.getLogger(__name__)
-
-
-class NodeFailed(Exception):
-    """A node without which the service is of no use has ended; the text says which and why."""
 
 
 @dataclass(frozen=True, slots=True)

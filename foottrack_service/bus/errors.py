@@ -7,6 +7,7 @@
     ├── BindFailed       the endpoint is malformed or taken
     ├── KeyFileError     a key file is missing, unfit, or open to others
     ├── NotReady         nothing answered at the other end in time
+    ├── NodeFailed       a node without which the service is of no use has ended
     └── ControlError     the service answered a request with an error; ``code`` says which
         └── ControlTimeout   the service did not answer at all
 """
@@ -32,6 +33,10 @@ class KeyFileError(BusError):
 
 class NotReady(BusError):
     """The bus was not there within the time given."""
+
+
+class NodeFailed(BusError):
+    """A node without which the service is of no use has ended; the text says which and why."""
 
 
 class ControlError(BusError):

@@ -16,10 +16,8 @@ import typer
 
 from foottrack_service.bus.errors import ControlError
 from foottrack_service.calibration.body import BodyFlow
-from foottrack_service.calibration.floor import FloorFlow
 from foottrack_service.calibration.flow import Flow, Refused
 from foottrack_service.calibration.heading import HeadingFlow
-from foottrack_service.calibration.mount import MountFlow
 from foottrack_service.cli.joining import joined
 from foottrack_service.cli.running import (
     ConfigOption,
@@ -59,6 +57,8 @@ def floor(
 
     Example: foottrack calibrate floor
     """
+    from foottrack_service.calibration.floor import FloorFlow
+
     settings = settings_for(config, user, connect)
     values = _calibrated(settings, "floor", {}, FloorFlow(settings), countdown, as_json)
     if values is not None:
@@ -117,6 +117,8 @@ def mount(
 
     Example: foottrack calibrate mount
     """
+    from foottrack_service.calibration.mount import MountFlow
+
     settings = settings_for(config, user, connect)
     values = _calibrated(settings, "mount", {}, MountFlow(settings), countdown, as_json)
     if values is not None:

@@ -31,7 +31,6 @@ from foottrack_service.cli.running import (
 from foottrack_service.cli.watch import StreamRates, rates_table
 from foottrack_service.config import Settings
 from foottrack_service.evaluation.statistics import summary_mm
-from foottrack_service.evaluation.truth import TruthTrack
 
 if TYPE_CHECKING:
     from foottrack_service.app import Service
@@ -125,6 +124,8 @@ class Watched:
         }
 
     def _errors(self, side: str) -> dict[str, float | None]:
+        from foottrack_service.evaluation.truth import TruthTrack
+
         truth = self._truth[f"truth/{side}"]
         feet = [(pose.t, getattr(pose.data, side)) for pose in self._poses]
         # A foot that no camera has seen yet stands where it was put: there is nothing to compare.

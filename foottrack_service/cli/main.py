@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from foottrack_protocol.errors import ProtocolError
-from foottrack_service.app import NodeFailed
 from foottrack_service.bus.errors import BusError
 from foottrack_service.cli import (
     bench,
@@ -84,7 +83,7 @@ def main() -> None:
         running.fail(str(error), error.code)
     except ConfigError as error:
         running.fail(str(error), running.EXIT_USAGE)
-    except (BusError, ProtocolError, RecordingError, NodeFailed, DatasetError) as error:
+    except (BusError, ProtocolError, RecordingError, DatasetError) as error:
         running.fail(str(error))
     except BrokenPipeError:
         sys.stderr.close()

@@ -11,7 +11,6 @@ import typer
 from foottrack_protocol.messages import GaitState
 from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.subscriber import Received
-from foottrack_service.cli.offline import results_of, settings_of
 from foottrack_service.cli.running import (
     CommandFailed,
     ConfigOption,
@@ -47,6 +46,8 @@ def trial(
     """
     run = Trial(distance, countdown)
     if file is not None:
+        from foottrack_service.cli.offline import results_of, settings_of
+
         recording = open_recording(file)
         settings = settings_of(recording, config)
         for message in results_of(recording, settings, quiet=as_json):

@@ -185,6 +185,12 @@ def test_doctor_says_what_is_wrong(tmp_path: Path) -> None:
     assert levels["service"] == "error"
 
 
+def test_nothing_heavy_is_loaded_before_a_command_needs_it() -> None:
+    code = "import sys, foottrack_service.cli.main; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"scipy", "numba", "cv2", "matplotlib", "foottrack_service.app"}.intersection(loaded)
+
+
 def test_libraries_talk_only_to_warn(tmp_path: Path) -> None:
     done = foottrack("markers", cwd=tmp_path)
     assert done.stderr == ""

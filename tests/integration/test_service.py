@@ -16,8 +16,9 @@ import pytest
 from foottrack_protocol import encode
 from foottrack_protocol.frames import STANDARD_GRAVITY
 from foottrack_protocol.messages import HeadPose, Imu, Optical
-from foottrack_service.app import NODES, Node, NodeFailed, Service, recorder_node
+from foottrack_service.app import NODES, Node, Service, recorder_node
 from foottrack_service.bus.connection import Bus
+from foottrack_service.bus.errors import NodeFailed
 from foottrack_service.cli.service import _one_node
 from foottrack_service.config import BusSettings, Settings
 from foottrack_service.evaluation import datasets
