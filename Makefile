@@ -39,8 +39,9 @@ lint: setup
 	$(BIN)/lint-imports
 	$(BIN)/hadolint docker/Dockerfile
 
+# Two kinds of tests at once: those that wait (integration, clients) and those that compute.
 test: lint
-	$(BIN)/pytest $(ARGS)
+	$(BIN)/pytest -n auto --dist loadgroup $(ARGS)
 
 # What cannot be installed here is no failure: its tests are skipped, and say so.
 engines:

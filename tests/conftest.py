@@ -8,6 +8,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Coroutine, Iterator
+from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
@@ -21,6 +22,8 @@ from foottrack_service.config import BusSettings
 EPHEMERAL = BusSettings(ingress="tcp://127.0.0.1:0", egress="tcp://127.0.0.1:0", control="tcp://127.0.0.1:0")
 LEAK_TIMEOUT_S = 5.0
 TEST_TIMEOUT_S = 30.0
+LIVE = ("clients", "integration")
+"""Folders whose tests wait for processes, sockets and devices, and would wait for each other."""
 
 T = TypeVar("T")
 Run = Callable[[Coroutine[Any, Any, T]], T]
@@ -29,6 +32,15 @@ Run = Callable[[Coroutine[Any, Any, T]], T]
 def pytest_addoption(parser: pytest.Parser) -> None:
     """``--update-golden``: write the golden results of tests/replay anew."""
     parser.addoption("--update-golden", action="store_true", help="write the golden results of tests/replay anew")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """With several workers (``pytest -n``), tests that live in real time share one, a folder at a time."""
+    here = Path(__file__).parent
+    for item in items:
+        folder = item.path.relative_to(here).parts[0]
+        if folder in LIVE:
+            item.add_marker(pytest.mark.xdist_group(folder))
 
 
 @pytest.fixture(scope="session", autouse=True)
