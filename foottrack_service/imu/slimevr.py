@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -16,6 +16,9 @@ Address = tuple[str, int]
 BEAT_S = 0.5
 GONE_S = 3.0
 """A tracker that said nothing for so long has to shake hands again."""
+
+PINGS_KEPT = 20
+"""The least round trip of the last 10 s is what the way takes; the others waited for a radio that slept."""
 
 MAX_TRACKERS = 32
 """Anybody on the network can shake hands: memory has an end."""
@@ -50,7 +53,7 @@ class _Tracker:
     number: int = 0
     ping: int = 0
     ping_sent_s: float = 0.0
-    round_trip_s: float = 0.0
+    round_trips_s: deque[float] = field(default_factory=lambda: deque(maxlen=PINGS_KEPT))
     rotations: dict[int, Rotation] = field(default_factory=dict)
 
 
@@ -102,7 +105,7 @@ class SlimeVrServer:
                     samples.append(self._sample(tracker, rotation, packet))
             elif isinstance(packet, Ping):
                 if packet.number == tracker.ping:
-                    tracker.round_trip_s = now_s - tracker.ping_sent_s
+                    tracker.round_trips_s.append(now_s - tracker.ping_sent_s)
             elif isinstance(packet, SensorInfo):
                 answers.append(Answer(address, slimevr.sensor_info_reply(packet)))
             elif isinstance(packet, slimevr.Features):
@@ -147,7 +150,7 @@ class SlimeVrServer:
             with_gravity(linear, q),
             q=q,
             accuracy=rotation.accuracy,
-            age_us=round(tracker.round_trip_s * 0.5e6),
+            age_us=round(min(tracker.round_trips_s, default=0.0) * 0.5e6),
         )
         return TrackerSample(f"{tracker.name}/{acceleration.sensor}", sample)
 

@@ -134,6 +134,21 @@ def test_a_silent_tracker_is_forgotten_and_searches_again() -> None:
     assert not tracker.connected
 
 
+def test_one_slow_echo_moves_no_stamp() -> None:
+    """A radio that sleeps answers late now and then: the samples of that half second are no older than the others."""
+    server = connected()
+    ages = []
+    for beat, round_trip_s in enumerate([0.006, 0.004, 0.2, 0.01, 0.15]):
+        now_s = 1.0 + beat
+        (ping,) = (answer.data for answer in server.beat(now_s) if answer.data[3] == slimevr.Kind.PING)
+        server.receive(ping, TRACKER, now_s + round_trip_s)
+        both = [slimevr.encode_rotation(0, Rotation(0, (0.0, 0.0, 0.0, 1.0), 3))]
+        both.append(slimevr.encode_acceleration(0, Acceleration(0, (0.0, 0.0, 0.0))))
+        ((_, sample),), _ = server.receive(slimevr.encode_bundle(beat + 1, both), TRACKER, now_s + 0.3)
+        ages.append(sample.age_us)
+    assert ages == [3000, 2000, 2000, 2000, 2000]
+
+
 def test_sensor_info_and_features_are_answered() -> None:
     server = connected()
     _, (info,) = server.receive(struct.pack(">IQBBB", 15, 1, 0, 1, 4), TRACKER, 0.1)
