@@ -39,7 +39,8 @@ def still_recording(t: npt.ArrayLike, acc: npt.ArrayLike, gyro: npt.ArrayLike | 
     if seconds < LEAST_S:
         raise NotStill(f"{seconds:.0f} s of samples, at least {LEAST_S:.0f} are needed, and an hour is better")
     steps = np.diff(t)
-    usual = float(np.median(steps))
+    # Samples that came in one datagram have one stamp.
+    usual = float(np.median(steps[steps > 0.0]))
     lost = np.where(steps > 1.5 * usual, np.round(steps / usual) - 1.0, 0.0)
     missing = int(lost.sum())
     if missing > MAX_MISSING_SHARE * len(t):
