@@ -22,8 +22,11 @@ def imus(settings: Settings, listen: bool) -> list[Finding]:
     named = ", ".join(port.device for port in there) or "none"
     found = [Finding("ok" if there else "note", "serial ports", named)]
     named_ports: dict[str, str] = {}
-    for side in SIDES:
-        device = getattr(settings.imu, side)
+    devices = {side: getattr(settings.imu, side) for side in SIDES}
+    allotment = ports.Allotment(
+        {side: device.port for side, device in devices.items() if device.format not in ("off", "slimevr")}
+    )
+    for side, device in devices.items():
         if device.format == "off":
             found.append(
                 Finding(
@@ -36,7 +39,7 @@ def imus(settings: Settings, listen: bool) -> list[Finding]:
             )
         else:
             try:
-                port = ports.find(device.port, there)
+                port = allotment.find(side, there)
             except ports.PortNotFound as error:
                 found.append(
                     Finding("error", f"imu {side}", str(error), "Plug it in, or mend the port in the settings.")

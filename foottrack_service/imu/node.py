@@ -8,7 +8,6 @@ import math
 from collections import Counter
 from functools import partial
 
-from foottrack_protocol.frames import SIDES
 from foottrack_protocol.messages import Side
 from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.publisher import Publisher
@@ -33,15 +32,16 @@ async def run(bus: Bus, settings: Settings) -> None:
     A device that is missing or unplugged is awaited and disturbs nobody else. Raises OSError when the socket for
     SlimeVR trackers cannot be opened.
     """
-    imu = settings.imu
-    taken: dict[Side, str] = {}
+    devices: dict[Side, ImuDeviceSettings] = {"left": settings.imu.left, "right": settings.imu.right}
+    serial = {side: device.port for side, device in devices.items() if device.format in SERIAL_FORMATS}
+    allotment = ports.Allotment(serial)
     trackers: dict[Side, ImuDeviceSettings] = {}
     async with asyncio.TaskGroup() as tasks:
-        for side, device in zip(SIDES, (imu.left, imu.right), strict=True):
+        for side, device in devices.items():
             if device.format == "slimevr":
                 trackers[side] = device
-            elif device.format != "off":
-                foot = _SerialFoot(bus, settings.user, side, device, taken)
+            elif side in serial:
+                foot = _SerialFoot(bus, settings.user, side, device, allotment)
                 tasks.create_task(foot.run(), name=f"imu {side}")
         if trackers:
             await _start_trackers(tasks, bus, settings, trackers)
@@ -75,11 +75,10 @@ class _Foot:
 
 
 class _SerialFoot(_Foot):
-    def __init__(self, bus: Bus, user: str, side: Side, device: ImuDeviceSettings, taken: dict[Side, str]) -> None:
+    def __init__(self, bus: Bus, user: str, side: Side, device: ImuDeviceSettings, allotment: ports.Allotment) -> None:
         super().__init__(bus, user, side, device.format)
         self._side = side
-        self._device = device
-        self._taken = taken
+        self._allotment = allotment
         self._bus = bus
         self._running = False
         self._source = SerialStream(device)
@@ -118,10 +117,7 @@ class _SerialFoot(_Foot):
         self._running = failure is None
 
     def _find_port(self) -> str:
-        others = {port for side, port in self._taken.items() if side != self._side}
-        port = ports.find(self._device.port, ports.available(), others)
-        self._taken[self._side] = port
-        return port
+        return self._allotment.find(self._side, ports.available())
 
     def _on_data(self, data: bytes, t_arr: int) -> None:
         for stamped in self._source.feed(data, t_arr):

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
-from collections.abc import Collection, Iterable
+import threading
+from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
+
+from foottrack_protocol.messages import Side
 
 _USB_ID = re.compile(r"([0-9a-fA-F]{4}):([0-9a-fA-F]{4})(?::(.+))?")
 
@@ -56,6 +61,35 @@ def find(wanted: str, ports: Iterable[Port], taken: Collection[str] = ()) -> str
     raise PortNotFound(f"no free serial port is {wanted!r}; there are: {seen}")
 
 
+class Allotment:
+    """Which port each foot's device has, whichever foot asks first. Threads may ask at the same time.
+
+    ``wanted`` are the settings ``port``. Who names one goes before who names an adapter, and that one before ``auto``;
+    alike, the first goes first. A port that was found stays its foot's until another one is found for it.
+    """
+
+    def __init__(self, wanted: Mapping[Side, str]) -> None:
+        self._turns = sorted(wanted.items(), key=lambda item: _vagueness(item[1]))
+        self._found: dict[Side, str] = {}
+        self._lock = threading.Lock()
+
+    def find(self, side: Side, ports: Collection[Port]) -> str:
+        """The device name of this foot's port. Raises PortNotFound."""
+        with self._lock:
+            taken: set[str] = set()
+            for other, device in self._found.items():
+                if other != side:
+                    taken |= _names(device)
+            for each, wanted in self._turns:
+                if each == side:
+                    self._found[side] = find(wanted, ports, taken)
+                    return self._found[side]
+                if each not in self._found:
+                    with suppress(PortNotFound):
+                        taken |= _names(find(wanted, ports, taken))
+        raise KeyError(side)
+
+
 def exists(device: str) -> bool:
     """Whether an open port is still plugged in."""
     if sys.platform == "win32":
@@ -65,6 +99,18 @@ def exists(device: str) -> bool:
 
 def _is_board(port: Port) -> bool:
     return port.vendor in _BOARD_VENDORS
+
+
+def _vagueness(wanted: str) -> int:
+    if wanted == "auto":
+        return 3
+    usb = _USB_ID.fullmatch(wanted)
+    return 0 if usb is None else 1 if usb[3] else 2
+
+
+def _names(device: str) -> set[str]:
+    """A setting may name a port by a link, and Windows does not care for case."""
+    return {device, device.upper(), os.path.realpath(device)}
 
 
 def _matches(port: Port, usb: re.Match[str]) -> bool:

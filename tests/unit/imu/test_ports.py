@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
+from foottrack_protocol.frames import SIDES
+from foottrack_protocol.messages import Side
 from foottrack_service.imu import ports
-from foottrack_service.imu.ports import Port, PortNotFound
+from foottrack_service.imu.ports import Allotment, Port, PortNotFound
 
 FTDI_A = Port("/dev/ttyUSB0", 0x0403, 0x6001, "A10", "FT232R")
 FTDI_B = Port("/dev/ttyUSB1", 0x0403, 0x6001, "B20", "FT232R")
@@ -44,6 +48,41 @@ def test_what_is_not_there_is_said_with_what_is() -> None:
     assert "COM7" in str(error.value)
     with pytest.raises(PortNotFound, match="none"):
         ports.find("auto", [])
+
+
+@pytest.mark.parametrize("first", ["left", "right"])
+def test_two_alike_are_always_dealt_in_the_same_order(first: Side) -> None:
+    allotment = Allotment({"left": "auto", "right": "auto"})
+    second: Side = "right" if first == "left" else "left"
+    found = {side: allotment.find(side, [FTDI_B, FTDI_A]) for side in (first, second)}
+    assert found == {"left": "/dev/ttyUSB0", "right": "/dev/ttyUSB1"}
+    # A board that is unplugged does not make the other foot's one its own.
+    with pytest.raises(PortNotFound):
+        allotment.find("left", [FTDI_B])
+    assert allotment.find("right", [FTDI_B]) == "/dev/ttyUSB1"
+
+
+@pytest.mark.parametrize("named", ["/dev/ttyUSB0", "0403:6001:A10"])
+def test_auto_leaves_alone_what_the_other_foot_names(named: str) -> None:
+    allotment = Allotment({"left": "auto", "right": named})
+    assert allotment.find("left", [FTDI_A, FTDI_B]) == "/dev/ttyUSB1"
+    assert allotment.find("right", [FTDI_A, FTDI_B]) == "/dev/ttyUSB0"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links to devices are POSIX")
+def test_auto_leaves_alone_what_the_other_foot_names_by_a_link(tmp_path: Path) -> None:
+    (tmp_path / "ttyUSB0").touch()
+    (tmp_path / "imu-right").symlink_to(tmp_path / "ttyUSB0")
+    there = [FTDI_A._replace(device=str(tmp_path / "ttyUSB0")), FTDI_B]
+    assert Allotment({"left": "auto", "right": str(tmp_path / "imu-right")}).find("left", there) == "/dev/ttyUSB1"
+
+
+def test_feet_that_ask_at_the_same_time_never_get_one_port() -> None:
+    for _ in range(50):
+        allotment = Allotment({"left": "auto", "right": "auto"})
+        with ThreadPoolExecutor(2) as threads:
+            found = list(threads.map(allotment.find, SIDES, [[FTDI_A, FTDI_B]] * 2))
+        assert found == ["/dev/ttyUSB0", "/dev/ttyUSB1"]
 
 
 def test_this_machines_ports_can_be_listed(tmp_path: Path) -> None:
