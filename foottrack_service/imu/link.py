@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable
-from contextlib import suppress
 
 from foottrack_service.bus.clock import BusClock
 from foottrack_service.imu import ports
@@ -98,10 +97,9 @@ class SerialLink:
         try:
             reason = await lost
         finally:
-            for task in (watching, telling):
-                task.cancel()
-                with suppress(asyncio.CancelledError):
-                    await task
+            watching.cancel()
+            telling.cancel()
+            await asyncio.gather(watching, telling, return_exceptions=True)
             await line.close()
             self.port = None
         self.losses += 1
@@ -110,7 +108,12 @@ class SerialLink:
 
     async def _watch(self, port: str, on_lost: OnLost) -> None:
         while True:
-            if not await asyncio.to_thread(ports.exists, port):
+            try:
+                there = await asyncio.to_thread(ports.exists, port)
+            except OSError as error:
+                on_lost(str(error))
+                return
+            if not there:
                 on_lost("unplugged")
                 return
             await asyncio.sleep(WATCH_S)

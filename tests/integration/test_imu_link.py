@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from foottrack_service.bus.clock import now
+from foottrack_service.imu import ports
 from foottrack_service.imu.devices.pty_port import PtyPort
 from foottrack_service.imu.line import Line, OnData, OnLost, open_asynchronous, open_threaded
 from foottrack_service.imu.link import SerialLink
@@ -142,6 +143,41 @@ def test_an_adapter_that_vanishes_without_an_error_is_noticed(tmp_path: Path, ru
         assert host.link.failure == f"{port} is gone: unplugged"
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
+
+    run(scenario())
+
+
+def test_a_machine_that_cannot_list_its_ports_loses_no_line_and_no_ctrl_c(
+    tmp_path: Path, run: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines: list[SilentLine] = []
+
+    class Counted(SilentLine):
+        def __init__(self) -> None:
+            lines.append(self)
+            self.open = True
+
+        async def close(self) -> None:
+            self.open = False
+
+    async def open_counted(port: str, baud: int, on_data: OnData, on_lost: OnLost, clock: Any) -> Line:
+        return Counted()
+
+    def fail(port: str) -> bool:
+        raise OSError("the registry is busy")
+
+    async def scenario() -> None:
+        host = Host(tmp_path / "ttyUSB0", open_counted)
+        monkeypatch.setattr(ports, "exists", fail)
+        running = asyncio.create_task(host.link.run())
+        await until(lambda: host.link.losses == 1)
+        assert host.link.failure == f"{tmp_path / 'ttyUSB0'} is gone: the registry is busy"
+        monkeypatch.setattr(ports, "exists", lambda port: True)
+        await until(lambda: host.link.connections == 2)
+        running.cancel()
+        await asyncio.wait({running}, timeout=5.0)
+        assert running.cancelled()
+        assert not any(line.open for line in lines)
 
     run(scenario())
 
