@@ -129,7 +129,7 @@ class _Reader:
         self.names.append(name)
         self.parents.append(parent)
         self.expect("{")
-        self.offsets.append([self.number(word) for word in self.take("OFFSET", 4)[1:]])
+        self.offsets.append([self.number(word) for word in self.take("OFFSET", 4)[1:4]])
         channels = self.take("CHANNELS", 2)[2:]
         if any(c[1:] not in ("position", "rotation") or c[0] not in "XYZ" for c in channels):
             raise self.wrong(f"joint {name}: unknown channel")

@@ -102,10 +102,17 @@ def format_glb(body: Humanoid, motion: Motion, name: str = "walk") -> bytes:
 def parse_glb(data: bytes) -> Motion:
     """The first animation of a GLB whose nodes carry our joints' names. Raises MotionFileError."""
     try:
-        file = gltf.GLTF2.load_from_bytes(data)
-        blob = file.binary_blob() if file is not None else None
-    except (ValueError, KeyError, TypeError, OSError, struct.error) as error:
-        raise MotionFileError(f"GLB: {error or type(error).__name__}") from None
+        return _first_motion(data)
+    except MotionFileError:
+        raise
+    except (ValueError, LookupError, TypeError, AttributeError, OSError, struct.error) as error:
+        # Whatever an index or a type in somebody's file leads to.
+        raise MotionFileError(f"GLB: not as glTF has it ({type(error).__name__}: {error})") from None
+
+
+def _first_motion(data: bytes) -> Motion:
+    file = gltf.GLTF2.load_from_bytes(data)
+    blob = file.binary_blob() if file is not None else None
     if blob is None or not file.animations:
         raise MotionFileError("GLB: no binary chunk with an animation")
     nodes = {node.name: i for i, node in enumerate(file.nodes)}
@@ -118,10 +125,9 @@ def parse_glb(data: bytes) -> Motion:
         view = file.bufferViews[a.bufferView]
         width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[a.type]
         start = (view.byteOffset or 0) + (a.byteOffset or 0)
-        try:
-            values = np.frombuffer(blob, np.float32, a.count * width, start).astype(np.float64)
-        except ValueError as error:
-            raise MotionFileError(f"GLB: accessor {accessor}: {error}") from None
+        if a.componentType != gltf.FLOAT:
+            raise MotionFileError(f"GLB: accessor {accessor}: only floats are read")
+        values = np.frombuffer(blob, np.float32, a.count * width, start).astype(np.float64)
         return values.reshape(a.count, width) if width > 1 else values
 
     animation = file.animations[0]
@@ -135,7 +141,7 @@ def parse_glb(data: bytes) -> Motion:
         if joint is not None and channel.target.path == "rotation":
             rotations[:, joint] = rot.normalised(values)
         elif joint == 0 and channel.target.path == "translation":
-            hips = values
+            hips[:] = values
     return Motion(times, hips, rotations)
 
 

@@ -244,6 +244,8 @@ def walk_along(
 def walk_for(cycle: Cycle, path: Path, seconds: float, *, speeds: list[tuple[float, float]] | None = None) -> Walk:
     """The longest walk from standing to standing that takes at most `seconds`. Raises PathError when not even one step
     does, or when the path ends before."""
+    if not 0.0 < seconds < np.inf:
+        raise PathError(f"a walk lasts more than 0 s, and ends; not {seconds:g} s")
     best: Walk | None = None
     for steps in range(1, 2 + int(2.0 * seconds / (cycle.period * _SLOWEST))):
         if steps * cycle.step > path.length + 1e-6:

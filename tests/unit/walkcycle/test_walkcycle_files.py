@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from random import Random
+
 import bvh as pypi_bvh
 import numpy as np
 import pytest
@@ -138,6 +140,30 @@ def test_broken_bvhs_name_the_line(walk: Walk) -> None:
 def test_broken_glbs_are_refused(data: bytes) -> None:
     with pytest.raises(MotionFileError, match="GLB"):
         parse_glb(data)
+
+
+def test_a_glb_with_bytes_changed_is_refused_or_read(walk: Walk) -> None:
+    whole = format_glb(walk.body, walk.motion(walk.times(10.0)))
+    random = Random(5)
+    refused = 0
+    for _ in range(300):
+        data = bytearray(whole)
+        # Its JSON is first.
+        for _ in range(random.randint(1, 4)):
+            data[random.randrange(12, 8000)] = random.randrange(32, 127)
+        try:
+            parse_glb(bytes(data))
+        except MotionFileError as error:
+            assert str(error).startswith("GLB: ")
+            refused += 1
+    assert refused > 50
+
+
+def test_a_bvh_offset_has_three_numbers(walk: Walk) -> None:
+    text = format_bvh(walk.body, walk.motion(np.array([0.0, 0.1])))
+    more = text.replace("OFFSET 0.00000000 0.00000000 0.00000000", "OFFSET 0.0 0.0 0.0 1.0", 1)
+    assert more != text
+    assert parse_bvh(more).offsets.shape[1] == 3
 
 
 def test_a_torn_glb_is_refused(walk: Walk) -> None:

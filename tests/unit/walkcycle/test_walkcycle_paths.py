@@ -166,6 +166,9 @@ def test_a_walk_for_some_seconds_lasts_no_longer() -> None:
     assert 8.0 - cycle.period < walk.duration <= 8.0
     with pytest.raises(PathError, match="not one step"):
         walk_for(cycle, circle(3.0), 0.5)
+    for never in (np.inf, np.nan, -1.0):
+        with pytest.raises(PathError, match="lasts more than 0 s"):
+            walk_for(cycle, circle(3.0), never)
 
 
 def test_the_clock_is_monotone_and_its_inverse_is_its_inverse() -> None:
