@@ -24,6 +24,9 @@ _HIPS_AHEAD = 0.03
 _SWAY_SHARE = 0.25
 """How much of the way to the standing foot the hips go: about 2 cm to each side in a walk."""
 
+_FARTHEST_LEAN = 0.9
+"""Of the trunk's length, the neck before the hips: bent by 64 deg."""
+
 _FADE_S = 0.4
 """From standing to walking, and back: what stands is carried a little differently."""
 
@@ -74,6 +77,8 @@ def carried(
     hips[:, 1] = _height(hips, left, right, facing, person, standing)
 
     lean = np.broadcast_to(np.asarray(extra.lean, dtype=np.float64), n)
+    # A child's trunk is shorter than some tasks lean an adult's forward.
+    lean = lean * min(1.0, _FARTHEST_LEAN * person.neck_above_hips / max(float(np.max(np.abs(lean))), 1e-9))
     drop = person.neck_above_hips - np.sqrt(person.neck_above_hips**2 - lean**2)
     towards = rotations.from_yaw(yaw + np.asarray(extra.yaw))
     neck = hips + rotations.rotate(towards, np.stack([np.zeros(n), -drop, -lean], axis=-1))

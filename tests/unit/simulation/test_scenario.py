@@ -141,6 +141,17 @@ def test_what_cannot_be_is_refused(arguments: dict[str, Any], text: str) -> None
         simulate(**{"task": "walk", "seed": 1, **arguments})
 
 
+@pytest.mark.parametrize("body", [{"height": 1.0}, {"height": 2.2}, {"height": 1.6, "thigh": 0.5, "shank": 0.5}])
+@pytest.mark.parametrize("task", ["knee-bends", "upper-body", "steps"])
+def test_any_body_has_a_head_in_every_posture(task: str, body: dict[str, float]) -> None:
+    settings = Settings.model_validate({"body": body})
+    truth = simulate(task, 1, settings=settings, seconds=12.0, camera=False, left_imu=False, right_imu=False).truth
+    t = np.linspace(0.0, 12.0, 400)
+    p, q = truth.head.pose(t)
+    assert np.isfinite(p).all() and np.isfinite(q).all()
+    assert p[:, 1].min() > 0.2 * body["height"]
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("task", ["line", "circle", "walk", "walk-in-place", "steps", "side-steps"])
 def test_any_seed_and_length_makes_a_plan(task: str, seed: int) -> None:
