@@ -24,13 +24,9 @@ if TYPE_CHECKING:
     from foottrack_service.camera.boards import Board, View
     from foottrack_service.camera.frame import Source
 
-app = typer.Typer(help="Look at what the camera sees.")
-calibrate_app = typer.Typer(help="Calibrations of the camera.")
-
 _PICTURES = (".png", ".jpg", ".jpeg")
 
 
-@app.callback(invoke_without_command=True)
 def camera(
     show: Annotated[
         Path, typer.Option("--show", help="FILE.png: the best of the pictures; DIR: all of them, found feet drawn in.")
@@ -84,7 +80,6 @@ def camera(
         raise CommandFailed("no foot was found: is the tag's id in the settings, sharp, and larger than 15 px?")
 
 
-@calibrate_app.command("camera")
 def calibrate_camera(
     files: Annotated[
         list[Path] | None, typer.Argument(help="Pictures of the board; none: live, from the source.")
@@ -145,7 +140,6 @@ def calibrate_camera(
         typer.echo(f"{key} = {value}")
 
 
-@calibrate_app.command("floor")
 def calibrate_floor(
     pictures: Annotated[int, typer.Option("--pictures", min=10, help="How many to use.")] = 60,
     config: ConfigOption = None,
@@ -155,7 +149,7 @@ def calibrate_floor(
 ) -> None:
     """Find the floor's height with the depth camera while the headset's pose is on the bus, and publish it.
 
-    The camera must be free: start the service without its camera node.
+    The camera must be free: start the service without its camera node. Example: foottrack calibrate floor-by-depth
     """
     from foottrack_service.camera.floor import FloorError
     from foottrack_service.cli.camera_floor import measure_floor

@@ -1,4 +1,4 @@
-"""``foottrack calibrate floor``: depth pictures and head poses of the same instants."""
+"""``foottrack calibrate floor-by-depth``: depth pictures and head poses of the same instants."""
 
 from __future__ import annotations
 

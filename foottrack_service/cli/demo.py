@@ -47,7 +47,7 @@ def demo(
     task: Annotated[str, typer.Option("--task", help="What the simulated person does; an unknown one lists them.")] = (
         "walk-in-place"
     ),
-    seed: Annotated[int, typer.Option("--seed", help="Another seed is another person with other noise.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Another seed is another person with other noise.")] = 1,
     imu_hz: Annotated[
         float, typer.Option("--imu-hz", min=20.0, max=1000.0, help="Rate of the simulated IMUs.")
     ] = 100.0,

@@ -39,8 +39,10 @@ TopicOption = Annotated[
     list[str] | None, typer.Option("--topic", "-t", help="Only topics that begin so; may be given several times.")
 ]
 OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder to write into; nothing there is overwritten.")]
-FromOption = Annotated[float | None, typer.Option("--from", min=0.0, help="Begin here, s from the first message.")]
-ToOption = Annotated[float | None, typer.Option("--to", min=0.0, help="End here, s from the first message.")]
+FromOption = Annotated[
+    float | None, typer.Option("--from", min=0.0, max=1e9, help="Begin here, s from the first message.")
+]
+ToOption = Annotated[float | None, typer.Option("--to", min=0.0, max=1e9, help="End here, s from the first message.")]
 
 
 @app.command()
@@ -143,10 +145,11 @@ def import_(
     from foottrack_service.recording.importer import copy
 
     with _readable_errors():
-        text = config.read_text(encoding="utf-8") if config is not None else None
-        if text is not None:
+        text = None
+        if config is not None:
             # Stricter than what a recording carries: a typing error is to be seen now.
             load(config)
+            text = config.read_text(encoding="utf-8")
         recording = _open(file)
         with RecordingFile(out, text) as written:
             copy(_progress(recording.frames(), "Importing"), written)

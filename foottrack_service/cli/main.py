@@ -88,3 +88,8 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         raise SystemExit(0) from None
+    except OSError as error:
+        # One that names a file is about a path that a person gave.
+        if error.filename is None:
+            raise
+        running.fail(f"{error.filename}: {error.strerror or error}")

@@ -9,16 +9,13 @@ import typer
 
 from foottrack_service.cli.running import EXIT_USAGE, CommandFailed, ConfigOption, JsonOption, print_json, settings_for
 
-app = typer.Typer(help="A printable sheet of tags.")
 
-
-@app.callback(invoke_without_command=True)
 def markers(
     out: Annotated[Path, typer.Option("--out", "-o", help="The PDF.")] = Path("foottrack-markers.pdf"),
     ids: Annotated[
         list[int] | None, typer.Option("--id", help="These tags instead of the settings'; needs --size. Repeatable.")
     ] = None,
-    size: Annotated[float | None, typer.Option("--size", help="Black edge to black edge, mm.")] = None,
+    size: Annotated[float | None, typer.Option("--size", min=1.0, help="Black edge to black edge, mm.")] = None,
     dictionary: Annotated[
         str | None,
         typer.Option("--dictionary", help="Such as DICT_4X4_50 or GENERATED_3X3_4; the settings' if absent."),

@@ -27,7 +27,7 @@ def sim(
     task: Annotated[
         str, typer.Option("--task", help="What the person does; an unknown one lists them.")
     ] = "walk-in-place",
-    seed: Annotated[int, typer.Option("--seed", help="Another seed is another person with other noise.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Another seed is another person with other noise.")] = 1,
     seconds: Annotated[
         float | None, typer.Option("--seconds", min=1.0, help="How long; the task's own if absent.")
     ] = None,
@@ -71,7 +71,10 @@ def scenario_for(task: str, seed: int, settings: Settings, **options: Any) -> An
     for option, known_values in choices.items():
         if options.get(option, known_values[0]) not in known_values:
             raise CommandFailed(f"--{option} is {' or '.join(known_values)}, not {options[option]!r}", EXIT_USAGE)
-    return simulate(task, seed, settings=settings, **options)
+    try:
+        return simulate(task, seed, settings=settings, **options)
+    except ValueError as error:
+        raise CommandFailed(str(error), EXIT_USAGE) from None
 
 
 def write_recording(scenario: Any, settings: Settings, out: Path) -> None:

@@ -73,7 +73,10 @@ class RecordingWriter:
         self._bytes_out = 0
         self._accepted = 0
         self._dropped = 0
-        self._check_space()
+        try:
+            self._check_space()
+        except OSError as error:
+            raise RecordingError(path, f"cannot be written: {error.strerror or error}") from None
         self._file = RecordingFile(path, config_toml, clock(), opener)
         self._file_bytes = 0
         self._stopping = threading.Event()

@@ -10,7 +10,6 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-import typer
 from typer.testing import CliRunner
 
 from foottrack_protocol.messages import HeadPose
@@ -18,15 +17,15 @@ from foottrack_service.bus import Broker, Bus
 from foottrack_service.camera.frame import Frame
 from foottrack_service.camera.rendering.renderer import Renderer
 from foottrack_service.camera.sources.rendered import RenderedSource
-from foottrack_service.cli import camera, markers
 from foottrack_service.cli.camera_floor import measure_floor
+from foottrack_service.cli.main import app
 from foottrack_service.cli.running import EXIT_USAGE, CommandFailed
 from foottrack_service.config import CameraSettings, Settings
 
 RENDERED = '[camera.source]\nkind = "rendered"\n[camera.source.rendered]\ntask = "still"\nlatency = 0.0\nfps = 30.0\n'
 
 
-def call(app: typer.Typer, *words: str) -> str:
+def call(*words: str) -> str:
     """A command's output. Raises what it raises."""
     result = CliRunner().invoke(app, list(words), catch_exceptions=False, standalone_mode=False)
     if result.exception is not None:
@@ -44,14 +43,14 @@ def rendered(tmp_path: Path) -> str:
 
 def test_show_writes_one_picture_or_many(rendered: str, tmp_path: Path) -> None:
     file = tmp_path / "feet.png"
-    said = json.loads(call(camera.app, "--show", str(file), "--count", "3", "--config", rendered, "--json"))
+    said = json.loads(call("camera", "--show", str(file), "--count", "3", "--config", rendered, "--json"))
     assert said["pictures"] == 3 and said["found"]["marker/left"] >= 1 and said["files"] == [str(file)]
     picture = cv2.imread(str(file))
     assert picture is not None and picture.shape == (480, 848, 3)
     # What is drawn has colour, what the camera sees has none.
     assert np.any(np.ptp(picture.astype(int), axis=2) > 100)
     folder = tmp_path / "all"
-    said = json.loads(call(camera.app, "--show", str(folder), "--count", "2", "--config", rendered, "--json"))
+    said = json.loads(call("camera", "--show", str(folder), "--count", "2", "--config", rendered, "--json"))
     assert sorted(map(str, folder.iterdir())) == sorted(said["files"]) and len(said["files"]) == 2
 
 
@@ -61,23 +60,23 @@ def test_show_fails_when_no_foot_is_seen(tmp_path: Path) -> None:
     config = tmp_path / "c.toml"
     config.write_text(f'[camera.source]\nkind = "folder"\n[camera.source.folder]\npath = {json.dumps(str(tmp_path))}\n')
     with pytest.raises(CommandFailed, match="no foot was found"):
-        call(camera.app, "--show", str(tmp_path / "x.png"), "--config", str(config))
+        call("camera", "--show", str(tmp_path / "x.png"), "--config", str(config))
     with pytest.raises(CommandFailed, match="no camera is configured"):
         config.write_text("")
-        call(camera.app, "--show", str(tmp_path / "x.png"), "--config", str(config))
+        call("camera", "--show", str(tmp_path / "x.png"), "--config", str(config))
 
 
 def test_markers_prints_the_settings_tags(tmp_path: Path) -> None:
     config, out = tmp_path / "c.toml", tmp_path / "m.pdf"
     config.write_text('[camera]\ndictionary = "GENERATED_3X3_4"\n')
-    said = json.loads(call(markers.app, "--out", str(out), "--config", str(config), "--json"))
+    said = json.loads(call("markers", "--out", str(out), "--config", str(config), "--json"))
     assert said["tags"] == [[0, 60.0], [1, 60.0]] and out.read_bytes().startswith(b"%PDF")
     said = json.loads(
-        call(markers.app, "--out", str(out), "--config", str(config), "--json", "--id", "3", "--size", "80")
+        call("markers", "--out", str(out), "--config", str(config), "--json", "--id", "3", "--size", "80")
     )
     assert said["tags"] == [[3, 80.0]]
     with pytest.raises(CommandFailed, match="ids 0 to 3") as refused:
-        call(markers.app, "--out", str(out), "--config", str(config), "--id", "4", "--size", "80")
+        call("markers", "--out", str(out), "--config", str(config), "--id", "4", "--size", "80")
     assert refused.value.code == EXIT_USAGE
 
 
@@ -110,19 +109,19 @@ def board_pictures(folder: Path, count: int) -> list[str]:
 
 def test_calibrate_camera_from_files(tmp_path: Path) -> None:
     files = board_pictures(tmp_path, 14)
-    said = json.loads(call(camera.calibrate_app, "camera", *files, "--json"))
+    said = json.loads(call("calibrate", "camera", *files, "--json"))
     assert said["lens"]["fx"] == pytest.approx(500.0, abs=2.0) and said["lens"]["cx"] == pytest.approx(319.5, abs=2.0)
     assert said["rms_px"] < 0.2 and said["views"] == 14
     # What is printed can be put into the settings as it is.
     config = tmp_path / "c.toml"
-    config.write_text(call(camera.calibrate_app, "camera", *files))
+    config.write_text(call("calibrate", "camera", *files))
     from foottrack_service.config import load
 
     assert load(config).settings.camera.source.lens.fx == pytest.approx(said["lens"]["fx"])
     with pytest.raises(CommandFailed, match="refused: 4 views show the board"):
-        call(camera.calibrate_app, "camera", *files[:4])
+        call("calibrate", "camera", *files[:4])
     with pytest.raises(CommandFailed, match="is no picture"):
-        call(camera.calibrate_app, "camera", str(config))
+        call("calibrate", "camera", str(config))
 
 
 class Accompanied:

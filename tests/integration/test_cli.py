@@ -152,6 +152,9 @@ def test_ctrl_c_closes_a_recording_and_says_what_is_in_it(tmp_path: Path) -> Non
         (["evaluate", "--seeds", "one"], 2, "whole numbers"),
         (["evaluate", "--real", "nowhere"], 1, "imu_sample.csv"),
         (["config", "check", "--config", "typo.toml"], 2, "heihgt"),
+        (["config", "init", "nowhere/foottrack.toml"], 1, "nowhere/foottrack.toml: No such file"),
+        (["sim", "--seconds", "4000", "--out", "x.mcap"], 2, "1 to 3600 s"),
+        (["log", "import", "walk.msgpack", "--out", "x.mcap", "--config", "latin.toml"], 2, "latin.toml"),
     ],
 )
 def test_what_a_person_can_get_wrong_is_one_helpful_line(
@@ -159,6 +162,7 @@ def test_what_a_person_can_get_wrong_is_one_helpful_line(
 ) -> None:
     (tmp_path / "broken.mcap").write_bytes(b"\x89MCAP0\r\nnonsense")
     (tmp_path / "typo.toml").write_text("[body]\nheihgt = 1.8\n")
+    (tmp_path / "latin.toml").write_bytes("# Größe\n".encode("latin-1"))
     done = foottrack(*args, cwd=tmp_path, code=code)
     assert helps in done.stderr
     assert len(done.stderr.strip().splitlines()) == (1 if "flying" not in args else done.stderr.strip().count("\n") + 1)

@@ -55,6 +55,11 @@ def test_everything_handed_over_is_in_the_file(tmp_path: Path) -> None:
     assert writer.error is None
 
 
+def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"nowhere.*a\.mcap: cannot be written: No such file"):
+        RecordingWriter(tmp_path / "nowhere" / "a.mcap", CONFIG, lambda: 7)
+
+
 def wait_until_flushed(part: Path, count: int, scratch: Path) -> Path:
     """The recovered recording, as soon as ``count`` messages are in the file."""
     scratch.mkdir()
