@@ -7,7 +7,7 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Coroutine, Generator, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -41,6 +41,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         folder = item.path.relative_to(here).parts[0]
         if folder in LIVE:
             item.add_marker(pytest.mark.xdist_group(folder))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_report_to_serializable() -> Generator[None, dict[str, Any] | None, dict[str, Any] | None]:
+    """Half characters, which some tests send and log, do not pass between pytest's processes."""
+    return _whole((yield))
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -104,3 +110,15 @@ def bus(broker: Broker, context: Context) -> Iterator[Bus]:
     """A connection to that broker over TCP, as another process has it."""
     with Bus.connect(broker.endpoints, context) as made:
         yield made
+
+
+def _whole(value: Any) -> Any:
+    match value:
+        case str():
+            return value.encode(errors="backslashreplace").decode()
+        case dict():
+            return {key: _whole(item) for key, item in value.items()}
+        case list() | tuple():
+            return type(value)(_whole(item) for item in value)
+        case _:
+            return value
