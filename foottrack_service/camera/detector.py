@@ -82,18 +82,20 @@ class TagDetector:
         self._narrow.minMarkerPerimeterRate = max(0.01, 4.0 * 0.4 * side / max(part.shape))
         self._narrow.maxMarkerPerimeterRate = max(4.0, 4.0 * 2.5 * side / max(part.shape))
         self._look.setDetectorParameters(self._narrow)
-        shift = (window.left + 0.5 / scale - 0.5, window.top + 0.5 / scale - 0.5)
-        return [Detection(d.id, d.corners / scale + shift) for d in self._detect(self._look, part)]
+        return self._detect(self._look, part, 1.0 / scale, window.left, window.top)
 
-    def _detect(self, detector: Any, picture: Gray) -> list[Detection]:
-        corners, ids, _ = detector.detectMarkers(picture)
+    def _detect(self, detector: Any, part: Gray, size: float = 1.0, left: int = 0, top: int = 0) -> list[Detection]:
+        """The tags in a part of a picture that begins at `left`, `top`, whose pixels are `size` of the picture's."""
+        corners, ids, _ = detector.detectMarkers(part)
         if ids is None:
             return []
+        x, y = left + 0.5 * size - 0.5, top + 0.5 * size - 0.5
         largest: dict[int, Detection] = {}
         for tag_id, four in zip(ids.reshape(-1).tolist(), corners, strict=True):
             if tag_id not in self._ids:
                 continue
-            found = Detection(tag_id, four.reshape(4, 2).astype(np.float64))
+            # Plain floats: numpy's arithmetic on eight numbers costs more than finding out where it is cheap.
+            found = Detection(tag_id, np.array([(x + size * u, y + size * v) for u, v in four.reshape(4, 2).tolist()]))
             known = largest.get(tag_id)
             if known is None or found.side_px > known.side_px:
                 largest[tag_id] = found

@@ -15,7 +15,7 @@ from foottrack_service.camera.fix import Fix, edge_distance
 from foottrack_service.camera.frame import Frame
 from foottrack_service.camera.pose import CORNER_SIGMA_PX, solve_target
 from foottrack_service.camera.pose_kernel import fit_both
-from foottrack_service.camera.ranging import DEPTH_NOISE, join_depth, tag_depth
+from foottrack_service.camera.ranging import DEPTH_NOISE, join_depth
 from foottrack_service.camera.rig import D435_COLOUR, Rig
 from foottrack_service.camera.targets import Tag, Target, owners
 from foottrack_service.compiled import is_compiled
@@ -40,8 +40,8 @@ class _Track:
     """What is known of one target: OpenCV's camera frame, m, m/s; `t` ns; no velocity after one sighting."""
 
     t: int
-    p: Array
-    v: Array | None
+    p: tuple[float, float, float]
+    v: tuple[float, float, float] | None
 
 
 class MarkerTracker:
@@ -84,9 +84,9 @@ class MarkerTracker:
         dt = (frame.t - track.t) * 1e-9
         if not 0.0 < dt <= LOST_AFTER_S:
             return None
-        x, y, z = track.p.tolist()
+        x, y, z = track.p
         if track.v is not None:
-            vx, vy, vz = track.v.tolist()
+            vx, vy, vz = track.v
             x, y, z = x + vx * dt, y + vy * dt, z + vz * dt
         if z < 0.1:
             return None
@@ -138,16 +138,18 @@ class MarkerTracker:
         track = self._tracks.get(target.side)
         if track is None or track.v is None:
             return 0.0
-        (x, y, z), (vx, vy, vz) = track.p.tolist(), track.v.tolist()
+        (x, y, z), (vx, vy, vz) = track.p, track.v
         across = math.hypot(vx - vz * x / z, vy - vz * y / z)
         return float(across * frame.exposure * self._rig.intrinsics.focal / z)
 
     def _follow(self, target: Target, t: int, p: Array) -> None:
+        x, y, z = p.tolist()
         before = self._tracks.get(target.side)
         v = None
         if before is not None and 0 < t - before.t <= LOST_AFTER_S * 1e9:
-            v = (p - before.p) / ((t - before.t) * 1e-9)
-        self._tracks[target.side] = _Track(t, p, v)
+            dt, (x0, y0, z0) = (t - before.t) * 1e-9, before.p
+            v = (x - x0) / dt, (y - y0) / dt, (z - z0) / dt
+        self._tracks[target.side] = _Track(t, (x, y, z), v)
 
 
 def say_what_takes_long() -> None:
@@ -160,6 +162,11 @@ def warm_up() -> None:
     """Compile what the first tag in view would wait for, or read it from the cache."""
     target = Target("left", (Tag(0, 0.06),))
     corners = D435_COLOUR.project(target.corners[0] * (1.0, -1.0, -1.0) + (0.0, 0.0, 1.0))
-    solve_target(target, [Detection(0, corners)], D435_COLOUR)
+    seen = [Detection(0, corners)]
+    pose = solve_target(target, seen, D435_COLOUR)
+    assert pose is not None
     shape = D435_COLOUR.height, D435_COLOUR.width
-    tag_depth(Frame(np.zeros(shape, np.uint8), np.zeros(shape, np.uint16), 0, 0), corners, DEPTH_NOISE)
+    frame = Frame(np.zeros(shape, np.uint8), np.full(shape, 1000, np.uint16), 0, 0)
+    p, cov, _ = join_depth(pose, target, seen, frame, DEPTH_NOISE)
+    rig = Rig(D435_COLOUR)
+    rig.to_head(p), rig.covariance_to_head(cov)

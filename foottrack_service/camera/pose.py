@@ -40,7 +40,6 @@ class TargetPose:
 
 @dataclass(frozen=True)
 class _Fit:
-    R: Array
     q: Array
     p: Array
     cov: Array
@@ -82,11 +81,9 @@ def solve_target(
     second = next((fit for fit in others if fit.squares < _WORSE**2 * (first.squares + floor)), None)
     # A prior on the corners' noise, updated by this picture's own residuals: blur shows in them.
     variance = (_CONFIDENCE * sigma_px**2 + first.squares) / (_CONFIDENCE + 2 * len(rays) - 6)
-    cov = first.cov * (variance / intrinsics.focal**2)
-    if second is not None:
-        # The position lies between the two solutions, and which is right is not known here.
-        apart = 0.5 * (second.p - first.p)
-        cov += apart[:, None] * apart
+    # Where there is a second one, the position lies between the two, and which is right is not known here.
+    other = first.p if second is None else second.p
+    cov = pose_kernel.spread(first.cov, variance / intrinsics.focal**2, first.p, other)
     return TargetPose(
         first.p,
         first.q,
@@ -100,10 +97,11 @@ def _fits(target: Target, tag_id: int, seen: Array, model: Array, rays: Array, f
     R, q, p, cov = np.empty((2, 3, 3)), np.empty((2, 4)), np.empty((2, 3)), np.empty((2, 3, 3))
     tag = target.sizes[tag_id], target.turns[tag_id], target.centres[tag_id]
     both = pose_kernel.fit_both(*tag, seen, model, rays, R, q, p, cov)
-    return [_Fit(R[i], q[i], p[i], cov[i], focal**2 * both[i]) for i in range(2) if both[i] >= 0.0]
+    return [_Fit(q[i], p[i], cov[i], focal**2 * both[i]) for i in range(2) if both[i] >= 0.0]
 
 
 def _same(a: _Fit, b: _Fit) -> bool:
-    # |A - B|^2 of two rotations is 8 sin^2(angle / 2).
-    apart = (a.R - b.R).ravel()
-    return bool(apart @ apart < 2.0 * _SAME_RAD**2)
+    # |a b| of two quaternions is the cosine of half the angle between them.
+    (ax, ay, az, aw), (bx, by, bz, bw) = a.q.tolist(), b.q.tolist()
+    cosine = ax * bx + ay * by + az * bz + aw * bw
+    return bool(1.0 - cosine * cosine < 0.25 * _SAME_RAD**2)

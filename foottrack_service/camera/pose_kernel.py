@@ -58,6 +58,16 @@ def fit_both(
 
 
 @compiled
+def spread(cov: Array, variance: float, p: Array, other: Array) -> Array:
+    """Covariance (3, 3) of a place ``p`` (3,) that may as well be half way to another: ``cov`` is for noise of 1."""
+    wide = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            wide[i, j] = variance * cov[i, j] + 0.25 * (other[i] - p[i]) * (other[j] - p[j])
+    return wide
+
+
+@compiled
 def _ippe(size: float, seen: Array, R: Array, p: Array) -> bool:
     """Both poses of a square from its homography's derivative at the centre (Collins and Bartoli, IPPE, 2014)."""
     x0, y0, x1, y1 = seen[0, 0], seen[0, 1], seen[1, 0], seen[1, 1]

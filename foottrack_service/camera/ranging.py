@@ -75,16 +75,25 @@ def join_depth(
         ratios.append(ratio)
         if not PLAUSIBLE_RATIO[0] <= ratio <= PLAUSIBLE_RATIO[1]:
             continue
-        innovation = found.z - by_size + float(pose.p[2] - p[2])
-        variance = float(cov[2, 2]) + found.sigma**2
-        if innovation**2 > _SURPRISE * variance:
-            # Blur makes tags look larger than their corners' noise admits.
-            cov = cov * (innovation**2 / (_SURPRISE * variance))
-            variance = float(cov[2, 2]) + found.sigma**2
-        along = cov[2]
-        p = p + along * (innovation / variance)
-        cov = cov - along[:, None] * (along / variance)
+        p, cov = _with_depth(p, cov, found.z - by_size + float(pose.p[2] - p[2]), found.sigma)
     return p, cov, statistics.median(ratios) if ratios else None
+
+
+@compiled
+def _with_depth(p: Array, cov: Array, innovation: float, sigma: float) -> tuple[Array, Array]:
+    """A place and its covariance, updated by the depth along z."""
+    grown = 1.0
+    variance = cov[2, 2] + sigma * sigma
+    if innovation * innovation > _SURPRISE * variance:
+        # Blur makes tags look larger than their corners' noise admits.
+        grown = innovation * innovation / (_SURPRISE * variance)
+        variance = grown * cov[2, 2] + sigma * sigma
+    p_next, cov_next = np.empty(3), np.empty((3, 3))
+    for i in range(3):
+        p_next[i] = p[i] + grown * cov[2, i] * innovation / variance
+        for j in range(3):
+            cov_next[i, j] = grown * (cov[i, j] - grown * cov[2, i] * cov[2, j] / variance)
+    return p_next, cov_next
 
 
 def _area(corners: Array) -> float:

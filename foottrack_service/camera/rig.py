@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from foottrack_service import rotations
 from foottrack_service.camera.settings import DISTORTION_LENGTHS
+from foottrack_service.compiled import compiled
 from foottrack_service.rotations import Array
 
 CV_TO_CAMERA: Array = np.array([1.0, 0.0, 0.0, 0.0])
@@ -74,9 +75,9 @@ class Intrinsics:
 
     def rays(self, pixels: npt.ArrayLike) -> Array:
         """Undistorted image coordinates x/z, y/z, shape (n, 2), of pixels, shape (n, 2)."""
-        flat = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        flat = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 2)
         if not self.distortion:
-            return (flat - (self.cx, self.cy)) / (self.fx, self.fy)
+            return _straight_rays(flat, self.fx, self.fy, self.cx, self.cy)
         undistorted = cv2.undistortPoints(flat.reshape(-1, 1, 2), self.matrix, self.coefficients)
         return np.asarray(undistorted, dtype=np.float64).reshape(-1, 2)
 
@@ -121,7 +122,8 @@ class Rig:
 
     def to_head(self, p_cv: npt.ArrayLike) -> Array:
         """Points, shape (..., 3), m, from OpenCV's camera frame to the head frame."""
-        return np.asarray(np.asarray(p_cv, dtype=np.float64) @ self.R_cv.T + self.p_cv)
+        points = np.ascontiguousarray(p_cv, dtype=np.float64)
+        return _moved(self.R_cv, self.p_cv, points.reshape(-1, 3)).reshape(points.shape)
 
     def from_head(self, p_head: npt.ArrayLike) -> Array:
         """Points, shape (..., 3), m, from the head frame to OpenCV's camera frame."""
@@ -133,4 +135,32 @@ class Rig:
 
     def covariance_to_head(self, cov: Array) -> Array:
         """Covariance of a position, shape (3, 3), m^2, turned from OpenCV's camera frame to the head's."""
-        return np.asarray(self.R_cv @ cov @ self.R_cv.T)
+        return _turned(self.R_cv, cov)
+
+
+@compiled
+def _straight_rays(pixels: Array, fx: float, fy: float, cx: float, cy: float) -> Array:
+    rays = np.empty((len(pixels), 2))
+    for i in range(len(pixels)):
+        rays[i, 0], rays[i, 1] = (pixels[i, 0] - cx) / fx, (pixels[i, 1] - cy) / fy
+    return rays
+
+
+@compiled
+def _moved(R: Array, p: Array, points: Array) -> Array:
+    moved = np.empty_like(points)
+    for n in range(len(points)):
+        for i in range(3):
+            moved[n, i] = R[i, 0] * points[n, 0] + R[i, 1] * points[n, 1] + R[i, 2] * points[n, 2] + p[i]
+    return moved
+
+
+@compiled
+def _turned(R: Array, cov: Array) -> Array:
+    turned = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                for n in range(3):
+                    turned[i, j] += R[i, k] * cov[k, n] * R[j, n]
+    return turned
