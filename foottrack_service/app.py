@@ -15,7 +15,7 @@ from foottrack_service.bridges import node as bridges_node
 from foottrack_service.bus.broker import Broker
 from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.control import ControlServer
-from foottrack_service.bus.errors import NodeFailed
+from foottrack_service.bus.errors import ControlError, NodeFailed
 from foottrack_service.bus.health import publish_health
 from foottrack_service.bus.log import BusLogHandler
 from foottrack_service.bus.session import SessionInfo, publish_session
@@ -108,7 +108,9 @@ class Service:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         logging.getLogger().removeHandler(self._log_handler)
         if self._recorder.recording:
-            await self._recorder.stop()
+            # One that ended badly has said so in the log.
+            with suppress(ControlError):
+                await self._recorder.stop()
         self._control.close()
         self._replays.close()
         self.bus.close()

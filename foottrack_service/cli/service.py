@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from typing import Annotated
 
@@ -86,6 +85,6 @@ async def _one_node(name: str, settings: Settings) -> None:
         telling = BusLogHandler(publisher, clock=bus.clock)
         logging.getLogger().addHandler(telling)
         try:
-            await asyncio.shield(asyncio.ensure_future(NODES[name].run(bus, settings)))
+            await NODES[name].run(bus, settings)
         finally:
             logging.getLogger().removeHandler(telling)

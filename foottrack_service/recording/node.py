@@ -101,7 +101,10 @@ class Recorder:
         """Begin ``<name>.mcap``. Raises ControlError: one runs already, or the file cannot be made."""
         if self._task is not None and not self._task.done():
             raise ControlError(Code.BUSY, "a recording is running already")
-        self._folder.mkdir(parents=True, exist_ok=True)
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ControlError(Code.FAILED, f"{self._folder}: {error.strerror or error}") from None
         started: asyncio.Future[RecordingWriter] = asyncio.get_running_loop().create_future()
         path = self._folder / (name + SUFFIX)
         if path.exists():

@@ -70,9 +70,12 @@ class ReplayDesk:
             self._replay = None
 
     async def _ask(self, cmd: str, **args: float) -> Any:
-        if self._replay is not None:
+        asked = self._replay
+        if asked is not None:
             try:
-                return await self._replay.request(cmd, args, _PATIENCE_S)
+                return await asked.request(cmd, args, _PATIENCE_S)
             except ControlTimeout:
-                self.close()
+                # Another one may have come meanwhile.
+                if self._replay is asked:
+                    self.close()
         raise ControlError(Code.NOT_RUNNING, "no replay runs")

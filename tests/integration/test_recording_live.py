@@ -97,6 +97,19 @@ def test_recordings_on_request_go_into_their_folder_and_nowhere_else(
     assert made == ["recordings", "recordings/walk-1.mcap", "recordings/walk-2.mcap"]
 
 
+def test_a_folder_that_cannot_be_made_is_the_answer(bus: Bus, run: Run, tmp_path: Path) -> None:
+    (tmp_path / "recordings").write_text("a file")
+    recorder = node.Recorder(bus, SETTINGS, tmp_path / "recordings")
+
+    async def scenario() -> None:
+        with pytest.raises(ControlError, match="recordings") as caught:
+            await recorder.start("walk")
+        assert caught.value.code == "failed"
+        assert not recorder.recording
+
+    run(scenario())
+
+
 class Stage:
     """A live replay on a clock that stands still until it is stepped."""
 

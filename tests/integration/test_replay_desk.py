@@ -8,6 +8,7 @@ from contextlib import closing
 from typing import Any
 
 import pytest
+from free_ports import three_free_ports
 
 from foottrack_protocol.control import ReplayState
 from foottrack_service.bus import ControlClient, ControlError, ControlServer
@@ -48,5 +49,25 @@ def test_requests_are_passed_on_to_the_replay_that_was_attached(context: Context
             for task in serving:
                 task.cancel()
             await asyncio.gather(*serving, return_exceptions=True)
+
+    run(scenario())
+
+
+def test_a_replay_that_comes_while_one_that_died_is_still_asked_is_kept(
+    context: Context, run: Callable[..., Any]
+) -> None:
+    async def scenario() -> None:
+        desk = ReplayDesk(context)
+        with closing(ControlServer(context, LOCAL, {"replay/seek": seek})) as replay, closing(desk):
+            serving = asyncio.create_task(replay.run())
+            desk.attach(f"tcp://127.0.0.1:{three_free_ports()}")
+            asked = asyncio.create_task(desk.pause())
+            await asyncio.sleep(0)
+            desk.attach(replay.endpoint)
+            with pytest.raises(ControlError, match="no replay runs"):
+                await asked
+            assert ReplayState.model_validate(await desk.seek(2.5)) == seek(2.5)
+            serving.cancel()
+            await asyncio.gather(serving, return_exceptions=True)
 
     run(scenario())

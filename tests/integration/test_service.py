@@ -15,7 +15,7 @@ import pytest
 
 from foottrack_protocol import encode
 from foottrack_protocol.frames import STANDARD_GRAVITY
-from foottrack_protocol.messages import HeadPose, Imu, Optical
+from foottrack_protocol.messages import CameraPreview, HeadPose, Imu, Optical
 from foottrack_service.app import NODES, Node, Service, recorder_node
 from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.errors import NodeFailed
@@ -25,7 +25,9 @@ from foottrack_service.evaluation import datasets
 from foottrack_service.evaluation.truth import TruthTrack
 from foottrack_service.fusion.core import FusionCore
 from foottrack_service.fusion.offline import fuse
+from foottrack_service.recording.errors import WriteError
 from foottrack_service.recording.reader import open_recording
+from foottrack_service.recording.writer import RecordingWriter
 from foottrack_service.simulation import node as simulation
 from foottrack_service.simulation.scenario import simulate
 
@@ -273,5 +275,55 @@ def test_a_node_in_a_process_of_its_own_tells_its_trouble_on_the_bus(run: Run, m
                     break
             node.cancel()
             await asyncio.gather(node, return_exceptions=True)
+
+    run(scenario())
+
+
+def test_a_node_in_a_process_of_its_own_ends_before_its_bus(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[Any] = []
+
+    async def thorough(bus: Bus, settings: Settings) -> None:
+        publisher = bus.publisher("imu-left")
+        await publisher.ready()
+        bus.health.node("imu-left", "running")
+        began.set()
+        try:
+            await asyncio.Event().wait()
+        finally:
+            # Its last words need the bus.
+            await asyncio.sleep(0)
+            ended.append(publisher.publish("user", "camera/preview", bus.clock(), CameraPreview(jpeg=b"bye")))
+
+    monkeypatch.setitem(NODES, "imu", Node("imu", thorough))
+    began = asyncio.Event()
+
+    async def scenario() -> None:
+        async with Service(settings_with()) as service:
+            node = asyncio.ensure_future(_one_node("imu", settings_with(bus=service.endpoints.model_dump())))
+            await began.wait()
+            node.cancel()
+            await asyncio.wait({node})
+            assert node.cancelled()
+            assert len(ended) == 1
+
+    run(scenario())
+
+
+def test_a_recording_that_ended_badly_does_not_keep_the_service_from_ending(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(writer: RecordingWriter) -> None:
+        raise WriteError(writer.path, "the disk was pulled out")
+
+    async def scenario() -> None:
+        config = settings_with(recording={"folder": tmp_path})
+        async with Service(config) as service:
+            with Bus.connect(service.endpoints) as other:
+                await other.control().request("record/start", {"name": "walk"})
+            close = RecordingWriter.close
+            monkeypatch.setattr(RecordingWriter, "close", lambda writer: (close(writer), refuse(writer)))
+        # The ports are free again.
+        async with Service(settings_with(bus=service.endpoints.model_dump())):
+            pass
 
     run(scenario())
