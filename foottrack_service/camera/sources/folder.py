@@ -101,7 +101,8 @@ def _pixels(path: Path, mode: int) -> npt.NDArray[Any] | None:
     if path.suffix != ".npy":
         return cv2.imread(str(path), mode)
     try:
-        return np.asarray(np.load(path, mmap_mode="r"))
+        # Copy on write: a picture like any other to compiled kernels, which tell arrays apart that cannot be written.
+        return np.asarray(np.load(path, mmap_mode="c"))
     except (OSError, ValueError):
         return None
 
