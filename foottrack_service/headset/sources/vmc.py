@@ -1,8 +1,8 @@
 """VMC: poses of a headset or of an avatar's head as OSC over UDP, in Unity's axes (protocol.vmc.info, version 2.7).
 
 Latency: unknown to one side, so what is known of it is a setting; what varies is taken out. Clock: the sender's own
-relative time (``/VMC/Ext/T``, a float32: 1 ms fine after two hours) against arrivals by recursive least squares;
-without it, the arrival.
+relative time (``/VMC/Ext/T``, a float32) against arrivals by recursive least squares; without it, or while it stands
+still or has grown coarse, the arrival.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ HOLD_S = 1.0
 
 _QUALITY = {"/VMC/Ext/Hmd/Pos/Local": 2, "/VMC/Ext/Hmd/Pos": 1, "/VMC/Ext/Bone/Pos": 0}
 """Local is the runtime's own stage, the other is scaled to the avatar; the bone is where the avatar's head ended up."""
+_COARSE_S = 2.0**14
+"""From here on a float32 is 2 ms coarse and soon 4, and a day later it jumps over whole frames."""
 _CLOCK = DeviceClock(modulus=1 << 62, tick_us=1.0, tolerance=1e-3)
 _UNIT_SLACK = 0.01
 _ERRORS = (PacketError, BundleError, MessageError, ValueError, IndexError, OverflowError, RecursionError)
@@ -45,6 +47,7 @@ class VmcReceiver:
         self._latency = round(settings.latency * 1e9)
         self._dejitter = Dejitter(_CLOCK)
         self._ticks: int | None = None
+        self._last_ticks: int | None = None
         self._root = NOWHERE
         self._spine: dict[str, Rigid] = {}
         self._heads: dict[str, Rigid] = {}
@@ -72,7 +75,9 @@ class VmcReceiver:
         chosen = self._chosen(t_arr)
         if chosen is None:
             return []
-        t = self._dejitter.stamp(self._ticks, t_arr).t - self._latency
+        moved = self._ticks != self._last_ticks
+        self._last_ticks = self._ticks
+        t = self._dejitter.stamp(self._ticks if moved else None, t_arr).t - self._latency
         message = self.stream.pose(t, self._heads[chosen]) if self._ok else self.stream.lost(t)
         return [] if message is None else [message]
 
@@ -89,7 +94,8 @@ class VmcReceiver:
 
     def _on_message(self, address: str, values: list[Any]) -> None:
         if address == "/VMC/Ext/T":
-            self._ticks = round(_finite(values[:1])[0] * 1e6)
+            (seconds,) = _finite(values[:1])
+            self._ticks = round(seconds * 1e6) if abs(seconds) < _COARSE_S else None
         elif address == "/VMC/Ext/OK":
             # loaded, calibration state, calibration mode, tracking status: the last since version 2.7.
             self._ok = bool(values[:1] != [0] and values[3:4] != [0])

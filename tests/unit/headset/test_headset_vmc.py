@@ -105,6 +105,24 @@ def test_a_sender_without_a_clock_is_stamped_by_arrival() -> None:
     assert message.t == ARRIVAL - 5_000_000
 
 
+@pytest.mark.parametrize("begun_s", [12 * 3600.0, 40 * 3600.0], ids=["coarse by 4 ms", "coarse by 16 ms"])
+def test_a_sender_that_has_run_for_a_day_loses_no_pose_and_no_millisecond(begun_s: float) -> None:
+    receiver = VmcReceiver(VmcSettings())
+    errors = []
+    for k in range(600):
+        arrival = ARRIVAL + round(k * 1e9 / 90.0)
+        (message,) = receiver.receive(VmcSender().datagram(begun_s + k / 90.0, HEAD), arrival)
+        errors.append(message.t - arrival)
+    assert max(map(abs, errors)) < 1_000_000
+    assert not receiver.drops
+
+
+def test_a_sender_whose_clock_stands_still_is_stamped_by_arrival() -> None:
+    receiver = VmcReceiver(VmcSettings())
+    stamps = [receiver.receive(VmcSender().datagram(0.0, HEAD), ARRIVAL + k * 11_000_000)[0].t for k in range(200)]
+    assert stamps == [ARRIVAL + k * 11_000_000 for k in range(200)]
+
+
 def test_a_sender_that_lost_its_head_says_so_and_so_does_silence() -> None:
     receiver, sender = VmcReceiver(VmcSettings()), VmcSender()
     assert receiver.idle(ARRIVAL) == []
