@@ -35,6 +35,7 @@ class Store:
     def __init__(self, folder: Path, user: str, shoes: str) -> None:
         self.path = folder / f"{user}.json"
         self._shoes = shoes
+        self._said: set[str] = set()
 
     @classmethod
     def at_home(cls, user: str, shoes: str) -> Store:
@@ -51,7 +52,7 @@ class Store:
             try:
                 found.append(_BODY.validate_python(entry))
             except ValidationError as error:
-                _log.warning("%s: %s is left out: %s", self.path, name, error.errors(include_url=False)[0]["msg"])
+                self._say_once(f"{name} is left out: {error.errors(include_url=False)[0]['msg']}")
         return found
 
     def layer(self) -> dict[str, Any]:
@@ -87,12 +88,18 @@ class Store:
         except FileNotFoundError:
             return {}
         except (OSError, ValueError) as error:
-            _log.warning("%s is left out: %s", self.path, error)
+            self._say_once(f"it is left out: {error}")
             return {}
         if not isinstance(kept, dict) or not all(isinstance(part, dict) for part in _parts(kept)):
-            _log.warning("%s is left out: it is no file of calibrations", self.path)
+            self._say_once("it is left out: it is no file of calibrations")
             return {}
         return kept
+
+    def _say_once(self, text: str) -> None:
+        # The service looks into the file every few seconds.
+        if text not in self._said:
+            self._said.add(text)
+            _log.warning("%s: %s", self.path, text)
 
     def _write(self, text: str) -> None:
         self.path.parent.mkdir(parents=True, exist_ok=True)

@@ -60,6 +60,18 @@ def test_a_broken_file_is_said_and_left_out(tmp_path, caplog, text) -> None:
     assert store.load() == [FLOOR]
 
 
+def test_what_is_broken_is_said_once_however_often_it_is_looked_at(tmp_path, caplog) -> None:
+    store = Store(tmp_path, "anna", "boots")
+    store.path.write_text('{"user": {"body": {"kind": "body", "values": {}}}}')
+    for _ in range(5):
+        store.load()
+    assert len(caplog.records) == 1
+    store.path.write_text("no JSON")
+    for _ in range(5):
+        store.load()
+    assert len(caplog.records) == 2
+
+
 def test_one_broken_entry_does_not_spoil_the_others(tmp_path, caplog) -> None:
     store = Store(tmp_path, "anna", "boots")
     store.keep(FLOOR)
