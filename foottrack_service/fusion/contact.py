@@ -13,7 +13,7 @@ import math
 
 from foottrack_service.compiled import compiled
 from foottrack_service.fusion.compiled_rotations import Vector, quaternion, rotation, squared, turned
-from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE, Stamps
+from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE, ROLL, Stamps
 from foottrack_service.fusion.foot_filter_kernel import GRAVITY
 from foottrack_service.fusion.foot_filter_memory import SEEN_KEPT, Foot
 from foottrack_service.rotations import Array
@@ -33,6 +33,8 @@ STILL_SIGMA = 0.005
 """m/s: how still a foot stands at best. Holds per 10 ms: neighbouring samples repeat the same truth."""
 SIGMA_GROWTH = 0.02
 """m/s per unit of the statistic."""
+LEVER = 0.05
+"""m: so far from the ball may the point be over which a foot rolls that turns while it stands."""
 
 PUSH, PUSH_SHARE = 0.5, 0.3
 """m/s^2, and per unit of the statistic: who is pushed by more, beyond what the tilt is unsure by, does not stand."""
@@ -50,10 +52,11 @@ PEAK, STATISTIC, DOUBTED, UNREST = 0, 1, 2, 3
 
 
 @compiled
-def stillness(t: Stamps, rows: Array, i: int, bias: Vector = (0.0, 0.0, 0.0)) -> tuple[float, Vector]:
+def stillness(t: Stamps, rows: Array, i: int, bias: Vector = (0.0, 0.0, 0.0)) -> tuple[float, Vector, Vector]:
     """The statistic over the window that ends at the IMU row i (0: as still as can be); inf before there is one.
 
-    And the mean specific force, m/s^2. ``bias``, m/s^2: what the accelerometer is known to be off by.
+    And the mean specific force, m/s^2, and the mean rate over its later half, rad/s. ``bias``, m/s^2: what the
+    accelerometer is known to be off by.
     Rates that are differences of a device's own attitude carry its corrections: they are averaged over half a window.
     """
     f0 = f1 = f2 = square = 0.0
@@ -75,26 +78,29 @@ def stillness(t: Stamps, rows: Array, i: int, bias: Vector = (0.0, 0.0, 0.0)) ->
             n += 1
         j -= 1
     if j < 0 or n < LEAST_SAMPLES:
-        return math.inf, (0.0, 0.0, 0.0)
+        return math.inf, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     f0, f1, f2 = f0 / n, f1 / n, f2 / n
     norm2 = f0 * f0 + f1 * f1 + f2 * f2
     spread2 = max(0.0, square / n - norm2)
-    off = math.sqrt((f0 - bias[0]) ** 2 + (f1 - bias[1]) ** 2 + (f2 - bias[2]) ** 2) - GRAVITY
+    off = math.sqrt(squared(f0 - bias[0]) + squared(f1 - bias[1]) + squared(f2 - bias[2])) - GRAVITY
     if rows[i, MEAN_RATE] == 1.0:
         rate = (late0 * late0 + late1 * late1 + late2 * late2) / late
         if n > late:
             rate += (early0 * early0 + early1 * early1 + early2 * early2) / (n - late)
-    return math.sqrt((spread2 + off * off) / FORCE_SPREAD**2 + rate / n / RATE**2), (f0, f1, f2)
+    statistic = math.sqrt((spread2 + off * off) / FORCE_SPREAD**2 + rate / n / RATE**2)
+    return statistic, (f0, f1, f2), (late0 / late, late1 / late, late2 / late)
 
 
 @compiled
 def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, memory: Array) -> float:
-    """How well the foot's velocity is known to be zero at the IMU row i, m/s per 10 ms; 0.0 when it swings.
+    """How well the velocity of the foot's ball is known to be zero at the IMU row i, m/s per 10 ms; 0.0 when it swings.
+
+    Writes into the row how the foot turns meanwhile: over its ball, from long before the heel is seen to rise.
 
     ``dt``, s, since the last sample; ``x`` and ``P`` the filter before it; ``memory``, shape (4,), is carried from
     sample to sample.
     """
-    statistic, mean = stillness(t, rows, i, (x[10], x[11], x[12]))
+    statistic, mean, rate = stillness(t, rows, i, (x[10], x[11], x[12]))
     memory[STATISTIC] = statistic
     memory[UNREST] += dt
     if not math.isfinite(statistic):
@@ -112,7 +118,9 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
         if memory[DOUBTED] < DOUBT_S:
             return 0.0
     memory[UNREST] -= dt
-    return STILL_SIGMA + SIGMA_GROWTH * statistic
+    rows[i, ROLL], rows[i, ROLL + 1], rows[i, ROLL + 2] = rate
+    turning = math.sqrt(squared(rate[0] - x[13]) + squared(rate[1] - x[14]) + squared(rate[2] - x[15]))
+    return STILL_SIGMA + SIGMA_GROWTH * statistic + LEVER * turning
 
 
 @compiled

@@ -33,6 +33,8 @@ MEAN_RATE = 14
 
 WANDER = 15
 """rad/sqrt(s): by how much GYRO's tilt wanders beyond a gyro's noise."""
+ROLL = 16
+"""rad/s, 3 columns: how a foot that stands turns."""
 
 # An optical fix, stage.
 POINT = 1

@@ -50,6 +50,8 @@ from foottrack_service.rotations import Array
 
 FEET_APART = {"left": -0.1, "right": 0.1}
 """m: where a foot stands that only an IMU knows (PROTOCOL, results)."""
+BALL = 0.65
+"""Share of the way from ankle to toes at which a foot rolls: the metatarsal heads."""
 KNOWN_SIGMA = 0.25
 """m per axis: of a foot that may claim a fix."""
 
@@ -83,7 +85,8 @@ class InertialFilter:
         foot, settings = self._foot, self._settings
         self._imu_p, self._imu_q = np.array(imu.p), rot.normalised(np.array(imu.q))
         foot["ankle_arm"] = rot.unrotate(self._imu_q, -self._imu_p)
-        foot["toe_arm"] = rot.unrotate(self._imu_q, np.array(settings.toe.p) - self._imu_p)
+        ball = np.array([1.0, 1.0, BALL]) * settings.toe.p
+        foot["ball_arm"] = rot.unrotate(self._imu_q, ball - self._imu_p)
         foot["foot_up"] = rot.unrotate(self._imu_q, np.array([0.0, 1.0, 0.0]))
         foot["foot_to_sensor"] = rot.conjugate(self._imu_q)
         foot["marker_arm"] = rot.unrotate(self._imu_q, np.array(settings.marker.p) - self._imu_p)

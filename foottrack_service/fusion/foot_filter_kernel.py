@@ -161,15 +161,15 @@ def update3(x: Array, P: Array, H: Array, innovation: Vector, noise: Array, gate
 
 
 @compiled
-def update_speed(x: Array, P: Array, variance: float, gate: float) -> float:
-    """The velocity is zero, with this variance per axis, (m/s)^2; else as ``update3``."""
+def update_speed(x: Array, P: Array, speed: Vector, variance: float, gate: float) -> float:
+    """The velocity is ``speed``, m/s, stage, with this variance per axis, (m/s)^2; else as ``update3``."""
     PH = P[3:6].copy()
     S = (
         (PH[0, 3] + variance, PH[0, 4], PH[0, 5]),
         (PH[1, 3], PH[1, 4] + variance, PH[1, 5]),
         (PH[2, 3], PH[2, 4], PH[2, 5] + variance),
     )
-    return _fuse3(x, P, PH, S, (-x[3], -x[4], -x[5]), gate)
+    return _fuse3(x, P, PH, S, (speed[0] - x[3], speed[1] - x[4], speed[2] - x[5]), gate)
 
 
 @compiled

@@ -27,12 +27,14 @@ FOOT = np.dtype(
         ("rows", np.float64, (2 * KEPT, COLUMNS)),
         ("X", np.float64, (2 * KEPT, NX)),
         ("P", np.float64, (2 * KEPT, NE, NE)),
-        # The newest sample: its stamp, its row, its q (zeros without one); the specific force of the last two; how many
-        # have come from the past since; how much a device has been moved lately (foot_filter_sample.py).
+        # The newest sample: its stamp, its row, its q (zeros without one); the specific force of the last two, and its
+        # largest component ever; how many have come from the past since; how much a device has been moved lately
+        # (foot_filter_sample.py).
         ("newest", np.int64),
         ("last", np.float64, COLUMNS),
         ("last_q", np.float64, 4),
         ("forces", np.float64, (2, 3)),
+        ("strongest", np.float64),
         ("behind", np.int64),
         ("effort", np.float64),
         # Stance (contact.py), and what is held of a foot that stands (foot_filter_output.py).
@@ -51,7 +53,7 @@ FOOT = np.dtype(
         # The shoe, in the sensor's frame: m, unit vectors and quaternions. ``floor``: height of a standing ankle in the
         # stage, NaN without a floor.
         ("ankle_arm", np.float64, 3),
-        ("toe_arm", np.float64, 3),
+        ("ball_arm", np.float64, 3),
         ("foot_up", np.float64, 3),
         ("foot_to_sensor", np.float64, 4),
         ("marker_arm", np.float64, 3),

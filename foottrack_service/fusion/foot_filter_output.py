@@ -1,7 +1,8 @@
 """What leaves the filter: the ankle predicted to a stamp, and the stance lock, compiled.
 
-A standing foot is held by its *toe*, since the heel rises first; when it leaves, what the lock had held back fades
-within 50 ms. Nothing is averaged: an average of 0.2 costs 9 mm and 39 ms on a walk (simulated).
+A standing foot is held by its *ball*, since the heel rises first (held by the toes' tip, which goes down meanwhile, the
+ankle was 2 cm too high); when it leaves, what the lock had held back fades within 50 ms. Nothing is averaged: an
+average of 0.2 costs 9 mm and 39 ms on a walk (simulated).
 """
 
 from __future__ import annotations
@@ -37,9 +38,9 @@ COASTING_ACCELERATION = 15.0
 
 # lock, shape (9,)
 LOCKED, HELD, OFFSET, SINCE, CONTACT = 0, 1, 4, 7, 8
-TOE_SPEED = 0.15
-"""m/s: a toe that is slower and has not risen still stands when the heel leaves."""
-TOE_RISE = 0.012
+BALL_SPEED = 0.15
+"""m/s: a ball that is slower and has not risen still stands when the heel leaves."""
+BALL_RISE = 0.012
 """m."""
 FASTEST_FOLLOW_S, SLOWEST_FOLLOW_S = 0.1, 1.0
 """How fast the lock follows the filter: landing is corrected soon, a foot that has stood for long hardly moves."""
@@ -52,21 +53,22 @@ RELEASE_S = 0.017
 @compiled
 def follow(s: Foot, dt: float) -> None:
     """Carry the stance lock over the newest sample, dt in s. ``lock[OFFSET]`` is what the output is moved by."""
-    lock, row, x, toe_arm = s.lock[:], s.last[:], s.X[s.n - 1], vector(s.toe_arm, 0)
+    lock, row, x, ball_arm = s.lock[:], s.last[:], s.X[s.n - 1], vector(s.ball_arm, 0)
     R = rotation(quaternion(x, 6))
-    arm = turned(R, toe_arm)
-    speed = turned(R, cross((row[GYRO] - x[13], row[GYRO + 1] - x[14], row[GYRO + 2] - x[15]), toe_arm))
-    toe = (x[0] + arm[0], x[1] + arm[1], x[2] + arm[2])
+    arm = turned(R, ball_arm)
+    speed = turned(R, cross((row[GYRO] - x[13], row[GYRO + 1] - x[14], row[GYRO + 2] - x[15]), ball_arm))
+    ball = (x[0] + arm[0], x[1] + arm[1], x[2] + arm[2])
     s2 = 0.0
     gap2 = 0.0
     for k in range(3):
         s2 += squared(x[3 + k] + speed[k])
-        gap2 += squared(toe[k] - lock[HELD + k])
-    pivots = lock[LOCKED] == 1.0 and s2 < TOE_SPEED**2 and toe[1] - lock[HELD + 1] < TOE_RISE
+        gap2 += squared(ball[k] - lock[HELD + k])
+    pivots = lock[LOCKED] == 1.0 and s2 < BALL_SPEED**2 and ball[1] - lock[HELD + 1] < BALL_RISE
     stands = row[ZERO_SIGMA] > 0.0 or pivots
     lock[CONTACT] = 1.0 if stands else 0.0
-    if not stands:
-        lock[LOCKED] = 0.0
+    if row[ZERO_SIGMA] == 0.0:
+        # What rolls on towards its toes is in contact still, but the ball rises then.
+        lock[LOCKED] = 1.0 if pivots else 0.0
         fade = math.exp(-dt / RELEASE_S)
         for k in range(3):
             lock[OFFSET + k] *= fade
@@ -74,14 +76,14 @@ def follow(s: Foot, dt: float) -> None:
     if lock[LOCKED] == 0.0 or gap2 > LARGEST_HOLD**2:
         keep = 1.0 if gap2 <= LARGEST_HOLD**2 or lock[LOCKED] == 0.0 else 0.0
         for k in range(3):
-            lock[HELD + k] = toe[k] + keep * lock[OFFSET + k]
+            lock[HELD + k] = ball[k] + keep * lock[OFFSET + k]
         lock[LOCKED] = 1.0
         lock[SINCE] = 0.0
     lock[SINCE] += dt
     share = min(1.0, dt / min(max(lock[SINCE], FASTEST_FOLLOW_S), SLOWEST_FOLLOW_S))
     for k in range(3):
-        lock[HELD + k] += share * (toe[k] - lock[HELD + k])
-        lock[OFFSET + k] = lock[HELD + k] - toe[k]
+        lock[HELD + k] += share * (ball[k] - lock[HELD + k])
+        lock[OFFSET + k] = lock[HELD + k] - ball[k]
 
 
 @compiled

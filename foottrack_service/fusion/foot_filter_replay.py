@@ -42,6 +42,7 @@ from foottrack_service.fusion.foot_filter_events import (
     POINT_SIGMA,
     QUIET_FLAG,
     RESET,
+    ROLL,
     SPEED,
     SPEED_SIGMA,
     TILT_SIGMA,
@@ -247,7 +248,7 @@ def _inertial_updates(s: Foot, row: Array, x: Array, P: Array, dt: float) -> Non
     h = np.zeros(NE)
     sigma = row[ZERO_SIGMA]
     if sigma > 0.0:
-        held = update_speed(x, P, sigma * sigma * 0.01 / dt, ZERO_GATE) <= ZERO_GATE
+        held = update_speed(x, P, _rolling(s, row, x), sigma * sigma * 0.01 / dt, ZERO_GATE) <= ZERO_GATE
         if held and row[FLOOR] == row[FLOOR]:
             R = rotation(quaternion(x, 6))
             up = turned(R, vector(s.foot_up, 0))
@@ -271,6 +272,18 @@ def _inertial_updates(s: Foot, row: Array, x: Array, P: Array, dt: float) -> Non
             _level(up, LEVEL_SIGMA**2 * 0.1 / dt, x, P)
     if row[UP] != 0.0 or row[UP + 1] != 0.0 or row[UP + 2] != 0.0:
         _level(vector(row, UP), UP_SIGMA**2 * UP_CORRELATED_S / dt, x, P)
+
+
+@compiled
+def _rolling(s: Foot, row: Array, x: Array) -> Vector:
+    """Velocity of the sensor, m/s, stage, of a foot that stands and rolls over its ball.
+
+    Held to be zero instead, it takes 2 to 3 cm/s into every swing: the ankle rises at 0.1 m/s while the foot is quiet.
+    """
+    R = rotation(quaternion(x, 6))
+    rate = (row[ROLL] - x[13], row[ROLL + 1] - x[14], row[ROLL + 2] - x[15])
+    v = turned(R, cross(rate, vector(s.ball_arm, 0)))
+    return -v[0], -v[1], -v[2]
 
 
 @compiled

@@ -43,9 +43,11 @@ QUIET_STATISTIC = 0.25
 MOST_RATE = 40.0
 """rad/s: increments of a device's q that are faster are its own corrections, not the foot."""
 FULL_SCALES = (39.2266, 78.4532, 156.9064)
-"""m/s^2 at which accelerometers end: 4, 8, 16 g."""
+"""m/s^2 at which accelerometers end: 4, 8, 16 g. Not this one, where it has ever given more."""
 STUCK_ABOVE = 11.0
-"""m/s^2: an axis that gives the same bits beyond this three times is at its end, wherever that is."""
+"""m/s^2: an axis that gives the same bits beyond this three times is at its end, wherever that is: no smaller than
+anything it has ever given. (Coarse or smooth samples repeat by chance, some every second, and each would cost the
+velocity 0.14 m/s of its certainty.)"""
 LEAST_FORCE = 1.0
 """m/s^2: a sensor in free fall does not know where up is."""
 DEVICE_TILT = 0.02
@@ -147,11 +149,13 @@ def _fill_sample(s: Foot, row: Array, has_gyro: bool, has_q: bool, dt: float) ->
         force = s.acc[k]
         row[ACC + k] = force
         largest = max(largest, abs(force))
-        stuck |= abs(force) > STUCK_ABOVE and force == s.forces[0, k] and force == s.forces[1, k]
+        s.strongest = max(s.strongest, abs(force))
+        repeats = force == s.forces[0, k] and force == s.forces[1, k]
+        stuck |= repeats and abs(force) > STUCK_ABOVE and abs(force) == s.strongest
         s.forces[1, k] = s.forces[0, k]
         s.forces[0, k] = force
     for scale in FULL_SCALES:
-        stuck |= 0.985 < largest / scale < 1.02
+        stuck |= largest / scale > 0.985 and s.strongest < 1.02 * scale
     row[CLIPPED] = 1.0 if stuck else 0.0
     q = (0.0, 0.0, 0.0, 0.0)
     if has_q:

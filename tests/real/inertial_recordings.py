@@ -17,9 +17,11 @@ from foottrack_service.fusion.interface import ImuSample
 from foottrack_service.rotations import Array
 
 DATA = Path(os.environ.get("FOOTTRACK_DATA", Path(__file__).parents[3] / "shared" / "data"))
-Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-Z_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""Their axes to ours, both proper rotations: the mirror of a z-down map is left to the comparison."""
+Z_UP = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
+Z_DOWN = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
+"""Their axes (x to the toes) to ours (-Z to the toes), both proper rotations.
+
+The mirror of a z-down map is left to the comparison."""
 
 
 @dataclass(frozen=True)

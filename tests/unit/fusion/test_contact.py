@@ -48,7 +48,7 @@ def test_a_known_bias_of_the_accelerometer_moves_nobody() -> None:
 
 def test_the_statistic_by_hand() -> None:
     t, made = still()
-    statistic, mean = stillness(t, made, 39)
+    statistic, mean, _ = stillness(t, made, 39)
     assert statistic == pytest.approx(0.0, abs=1e-6)
     assert mean == pytest.approx((0.0, GRAVITY, 0.0))
     made[:, GYRO] = 0.3
