@@ -42,7 +42,7 @@ class Row(NamedTuple):
 
 
 class StreamRates:
-    """Rates and latencies per topic over a sliding second, from what a subscriber received."""
+    """Rates and latencies per topic over a sliding second, from what a subscriber received and counts by topic."""
 
     def __init__(self, subscriber: Subscriber) -> None:
         self._subscriber = subscriber
@@ -55,6 +55,9 @@ class StreamRates:
         """Count a batch, and keep the last of ``sys/health``."""
         for received in batch:
             topic = received.message.topic
+            if topic not in self._subscriber.stats.topics:
+                # A producer that makes up users: the subscriber has stopped counting topics one by one.
+                continue
             if isinstance(received.message.data, Health):
                 self.health = received.message.data
             self._recent.setdefault(topic, []).append((received.arrival, received.arrival - received.message.t_pub))

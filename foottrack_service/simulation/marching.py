@@ -29,7 +29,8 @@ _SWING_SHARE = 0.38
 def marching(cadence: float, peak: float, turn: float = 0.0) -> Maker:
     """Bouts of 8 to 14 steps at ``cadence`` steps/s with ankles raised by ``peak`` m, and pauses of 1.5 to 2.5 s.
 
-    With ``turn``, rad, each step turns the person by so much. Raises ValueError for what nobody can do.
+    With ``turn``, rad, each foot is put down turned by so much against the middle of both, which turns the person by
+    two thirds of it a step. Raises ValueError for what nobody can do.
     """
     if not (0.3 <= cadence <= 4.0 and 0.02 <= peak <= 0.6):
         raise ValueError(f"nobody walks in place at {cadence:g} steps/s with feet raised by {peak:g} m")
