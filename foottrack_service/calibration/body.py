@@ -19,6 +19,7 @@ from foottrack_service.calibration.stillness import StillHead
 from foottrack_service.config import BodySettings, Settings
 from foottrack_service.rotations import Array
 
+_FIRST = "Stand upright and still, feet together, and look straight ahead."
 UPRIGHT_S = 3.0
 MOST_NOD = math.radians(25.0)
 """A head that nods further is not level, and its eyes are not at their height."""
@@ -45,7 +46,7 @@ class BodyFlow(Flow):
         self._level_since: int | None = None
         self._nods = False
         self._feet: deque[tuple[int, Array]] = deque()
-        self.progress = Progress(0.0, "Stand upright and still, feet together, and look straight ahead.")
+        self.progress = Progress(0.0, _FIRST)
 
     def _take(self, message: Message, now: int) -> None:
         if isinstance(message.data, BodyPose):
@@ -63,6 +64,7 @@ class BodyFlow(Flow):
 
     def _on_untracked(self) -> None:
         self._head.reset()
+        self.progress = Progress(0.0, _FIRST)
 
     def _on_feet(self, t: int, body: BodyPose) -> None:
         feet = (body.left, body.right)
@@ -76,7 +78,8 @@ class BodyFlow(Flow):
             self.progress = Progress(0.0, "Look straight ahead.")
             return
         if self._head.since is None:
-            self.progress = Progress(0.0, "Stand still.")
+            if self._head.sd is not None:
+                self.progress = Progress(0.0, "Stand still.")
             return
         stood = (t - max(self._level_since, self._head.since)) * 1e-9
         if stood < UPRIGHT_S:

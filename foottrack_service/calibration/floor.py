@@ -17,6 +17,7 @@ from foottrack_service.config import Settings
 from foottrack_service.fusion.foot_filter_optical import implausible
 from foottrack_service.rotations import Array
 
+_FIRST = "Stand still, both feet flat on the floor, and look down at your feet."
 LEAST_FIXES = 10
 """Of a foot, while the head is still."""
 MOST_SPREAD = 0.012
@@ -47,7 +48,7 @@ class FloorFlow(Flow):
         self._problem = ""
         self._uneven = False
         self._seen = False
-        self.progress = Progress(0.0, "Stand still, both feet flat on the floor, and look down at your feet.")
+        self.progress = Progress(0.0, _FIRST)
 
     def _take(self, message: Message, now: int) -> None:
         for side, fix in self._sight.take(message):
@@ -63,12 +64,14 @@ class FloorFlow(Flow):
 
     def _on_untracked(self) -> None:
         self._head.reset()
+        self.progress = Progress(0.0, _FIRST)
 
     def _try(self, t: int) -> None:
         since = self._head.since
         if since is None:
             self._problem = self._head.problem
-            self.progress = Progress(0.0, "Keep your head still.")
+            if self._head.sd is not None:
+                self.progress = Progress(0.0, "Keep your head still.")
             return
         heights: dict[Side, float] = {}
         self._uneven = False

@@ -23,6 +23,8 @@ LEAST_FOOT_STEP = 0.15
 """m, of a foot, by its IMU."""
 MOST_ASIDE = math.radians(25.0)
 """Between the look and the step."""
+MOST_TURN = math.radians(45.0)
+"""Of the look: more, and the person turned on the spot, which takes the eyes as far as a step."""
 MOST_TWIST = math.radians(40.0)
 """Between the way a foot went and the way it points: more is another mounting than the configured one."""
 _FIRST, _NEXT = "Stand still, feet parallel, and look straight ahead.", "Now take one step forward, and stand still."
@@ -74,13 +76,15 @@ class HeadingFlow(Flow):
 
     def _still(self) -> None:
         places, turns = self._head.poses(STILL_S)
-        place = places.mean(axis=0)
+        place, looks = places.mean(axis=0), _mean([head_yaw(q) for q in turns])
+        if self._from is not None and abs(_wrapped(looks - self._looked)) > MOST_TURN:
+            self._from = None
         if self._from is None or math.hypot(*(place - self._from)[[0, 2]]) < LEAST_STEP:
             if self._from is None:
                 for side in list(self._samples):
                     self._samples[side] = [s for s in self._samples[side] if s.t >= self._samples[side][-1].t - STILL_S]
             self._from = place
-            self._looked = _mean([head_yaw(q) for q in turns])
+            self._looked = looks
             self.progress = Progress(0.5, _NEXT)
         elif all(self._has_settled(samples) for samples in self._samples.values()):
             self._finish(place - self._from)

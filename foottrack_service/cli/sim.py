@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -45,6 +47,7 @@ def sim(
 ) -> None:
     """Publish a simulated person's IMUs, camera, headset and truth on a running bus, in real time.
 
+    With --task calibration it does what the calibrations ask, and says when.
     Examples: foottrack sim --task line; foottrack sim --task walk --seed 7 --out walk.mcap
     """
     settings = settings_for(config, user, connect)
@@ -54,7 +57,7 @@ def sim(
         return
     typer.echo(f"{task}, {scenario.seconds:g} s, on {settings.bus.ingress}. Ctrl-C ends it.", err=True)
     try:
-        run_loop(_publish(settings, scenario))
+        run_loop(_publish(settings, scenario, said(task, scenario.seconds)))
     except KeyboardInterrupt:
         typer.echo("Stopped.", err=True)
 
@@ -75,6 +78,21 @@ def scenario_for(task: str, seed: int, settings: Settings, **options: Any) -> An
         return simulate(task, seed, settings=settings, **options)
     except ValueError as error:
         raise CommandFailed(str(error), EXIT_USAGE) from None
+
+
+def said(task: str, seconds: float) -> Callable[[float], None]:
+    """Prints what the person does when its time, s, has come."""
+    from foottrack_service.simulation.tasks import TASKS
+
+    announced = TASKS[task].announced
+    waiting = deque(() if announced is None else announced(seconds))
+
+    def say(over: float) -> None:
+        while waiting and waiting[0].at <= over:
+            at, text = waiting.popleft()
+            typer.echo(f"{int(at) // 60}:{int(at) % 60:02} {text}", err=True)
+
+    return say
 
 
 def write_recording(scenario: Any, settings: Settings, out: Path) -> None:
@@ -100,8 +118,8 @@ def write_recording(scenario: Any, settings: Settings, out: Path) -> None:
     typer.echo(f"Wrote {out}: {file.messages} messages, {scenario.seconds:g} s.", err=True)
 
 
-async def _publish(settings: Settings, scenario: Any) -> None:
+async def _publish(settings: Settings, scenario: Any, progress: Callable[[float], None]) -> None:
     from foottrack_service.simulation import node
 
     async with joined(settings) as bus:
-        await node.run(bus, settings, scenario)
+        await node.run(bus, settings, scenario, progress=progress)

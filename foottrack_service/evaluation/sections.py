@@ -239,4 +239,4 @@ def _rounded(value: float) -> float:
 
 def all_tasks() -> list[str]:
     """Names of all simulated tasks."""
-    return list(TASKS)
+    return [name for name, task in TASKS.items() if task.announced is None]

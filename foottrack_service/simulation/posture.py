@@ -29,14 +29,16 @@ _FARTHEST_LEAN = 0.9
 
 _FADE_S = 0.4
 """From standing to walking, and back: what stands is carried a little differently."""
+_LOOK_DOWN = np.radians(60.0)
+"""Only so does a camera mounted 20 deg down see the wearer's own feet."""
 
 
 @dataclass(frozen=True)
 class Bearing:
     """How the person carries hips and head. Angles in rad, lengths in m."""
 
-    look_down: float = np.radians(60.0)
-    """The headset's pitch. Only so does a camera mounted 20 deg down see the wearer's own feet."""
+    look_down: Array | float = _LOOK_DOWN
+    """The headset's pitch, or what it is on the truth's grid, (n,)."""
     gaze_sd: float = np.radians(2.5)
     gaze_band_hz: float = 0.5
     sway_sd: float = 0.008

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from foottrack_service.config import Settings
-from foottrack_service.simulation import bench, people, stairs
+from foottrack_service.simulation import bench, calibrating, people, stairs
 from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.truth import Truth
 
@@ -24,6 +24,8 @@ class Task:
     seconds: float
     """How long it lasts unless told otherwise."""
     truth: Maker
+    announced: Callable[[float], Sequence[calibrating.Announced]] | None = None
+    """What is said while it lasts so many s, to people who play along."""
 
 
 TASKS: dict[str, Task] = {
@@ -49,6 +51,13 @@ TASKS: dict[str, Task] = {
         Task("walk", "a normal walk of 1.27 m/s with stops and turns", 30.0, people.walk),
         Task("stairs", "up two stairs of 17 cm and down again, backwards, with rests", 30.0, stairs.stairs),
         Task("s-curve", "a normal walk along an S", 20.0, people.s_walk),
+        Task(
+            "calibration",
+            "does what calibrate floor, body and heading ask for, round after round of 28 s, and says when",
+            10.0 * calibrating.ROUND_S,
+            calibrating.calibration,
+            calibrating.announced,
+        ),
     )
 }
 """By name."""

@@ -15,6 +15,7 @@ from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.errors import ControlError
 from foottrack_service.calibration.body import BodyFlow
 from foottrack_service.calibration.floor import FloorFlow
+from foottrack_service.calibration.heading import HeadingFlow
 from foottrack_service.calibration.node import CalibrationDesk
 from foottrack_service.calibration.store import Store
 from foottrack_service.cli.calibrate_person import ask
@@ -190,5 +191,33 @@ def test_the_command_rings_three_times_for_a_refusal(run: Run) -> None:
             with pytest.raises(ControlError, match="headset"):
                 await ask(client, "floor", {}, FloorFlow(client), 0, lambda _: None, lambda: rings.append(None))
         assert len(rings) == 4
+
+    run(scenario())
+
+
+@pytest.mark.slow
+def test_a_person_who_does_what_is_said_is_calibrated_by_all_three_commands(run: Run, tmp_path) -> None:
+    """``foottrack run``, ``foottrack sim --task calibration`` and the three commands, in real time: about 22 s."""
+
+    async def scenario() -> None:
+        config = settings_with()
+        store = Store(tmp_path, "user", "default")
+        heard: dict[str, list[str]] = {}
+        found: dict[str, Any] = {}
+        async with Service(config, store) as service:
+            client = config.model_copy(update={"bus": service.endpoints})
+            person = simulate("calibration", 1, settings=config, seconds=60.0, depth=False)
+            play = asyncio.ensure_future(simulation.run(service.bus, config, person))
+            for kind, flow in (("floor", FloorFlow), ("heading", HeadingFlow), ("body", BodyFlow)):
+                said = heard[kind] = []
+                found[kind] = (await ask(client, kind, {}, flow(client), 0, said.append, lambda: None))["values"]
+            play.cancel()
+        assert abs(found["floor"]["height"]) < 0.02
+        assert abs(found["heading"]["yaw"]) < 0.05
+        assert found["body"]["height"] == pytest.approx(1.75, abs=0.02)
+        assert {body.kind for body in store.load()} >= {"floor", "body"}
+        assert heard["floor"] == [heard["floor"][0], "Done. Thank you."]
+        assert "Now take one step forward, and stand still." in heard["heading"]
+        assert heard["body"][0].startswith("Stand upright") and "Good. Stay like that." in heard["body"]
 
     run(scenario())

@@ -55,11 +55,14 @@ def raised(messages: Iterable[tuple[int, Message]], height: float) -> Iterable[t
         yield arrival, message
 
 
-def watch(flow: Flow, messages: Iterable[tuple[int, Message]], until_s: float | None = None) -> list[str]:
-    """Run a flow over messages, and on in silence until ``until_s``; what it told the person, in order."""
+def watch(
+    flow: Flow, messages: Iterable[tuple[int, Message]], until_s: float | None = None, began: int = 0
+) -> list[str]:
+    """Run a flow that was ``began`` at so many ns over messages, and on in silence until ``until_s``; what it told the
+    person, in order."""
     told = [flow.progress.text]
-    flow.begin(0)
-    now, last = 0, 0
+    flow.begin(began)
+    now, last = began, began
     for arrival, message in messages:
         now = arrival
         if any(message.stream.startswith(stream) for stream in flow.streams):

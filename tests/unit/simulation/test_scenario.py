@@ -25,6 +25,7 @@ def test_the_tasks_of_the_study_and_the_bench_are_there() -> None:
     assert list(TASKS) == [
         "still", "head-moving", "steps", "side-steps", "line", "circle", "knee-bends", "upper-body",
         "tracker-moving", "head-bench", "sudden-move", "walk-in-place", "walk", "stairs", "s-curve",
+        "calibration",
     ]  # fmt: skip
     assert all(task.name == name and task.description and task.seconds >= 15.0 for name, task in TASKS.items())
 
