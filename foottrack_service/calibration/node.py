@@ -45,6 +45,7 @@ class CalibrationDesk:
         self._publisher = bus.publisher(SOURCE)
         self._known: dict[str, Any] = {}
         self._under_way: Flow | None = None
+        self._keeping = asyncio.Lock()
 
     @property
     def handlers(self) -> dict[str, Callable[..., Any]]:
@@ -82,14 +83,14 @@ class CalibrationDesk:
             while True:
                 for received in heard.drain():
                     background.take(received.message)
-                self._keep(background.due(self._bus.clock()))
+                await self._keep(background.due(self._bus.clock()))
                 self._recall()
                 for body in self._known.values():
                     self._publish(body)
                 await asyncio.sleep(REPEAT_S)
         finally:
-            self._keep(background.newest)
             heard.close()
+            await self._keep(background.newest)
 
     @property
     def _floor(self) -> float:
@@ -118,17 +119,19 @@ class CalibrationDesk:
             self._under_way = None
         self._known[_name(found)] = found
         self._publish(found)
-        self._keep(found)
+        await self._keep(found)
         return found
 
-    def _keep(self, found: Any) -> None:
-        if self._store is None or found is None:
-            return
-        try:
-            self._store.keep(found)
-        except StoreError as error:
-            _log.warning("the calibration counts until the service ends: %s", error)
-            self._store = None
+    async def _keep(self, found: Any) -> None:
+        """In a thread: a disk takes 10 to 40 ms, in which the loop would publish no pose."""
+        async with self._keeping:
+            if self._store is None or found is None:
+                return
+            try:
+                await asyncio.to_thread(self._store.keep, found)
+            except StoreError as error:
+                _log.warning("the calibration counts until the service ends: %s", error)
+                self._store = None
 
     async def _watch(self, flow: Flow) -> Any:
         subscriber = self._bus.subscriber([f"{self._settings.user}/{stream}" for stream in flow.streams])

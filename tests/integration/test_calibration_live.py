@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,7 @@ from foottrack_protocol.messages import FloorCalibration, FloorValues, HeadPose,
 from foottrack_service.app import Service
 from foottrack_service.bus.connection import Bus
 from foottrack_service.bus.errors import ControlError
+from foottrack_service.calibration import node as calibration_node
 from foottrack_service.calibration.body import BodyFlow
 from foottrack_service.calibration.floor import FloorFlow
 from foottrack_service.calibration.heading import HeadingFlow
@@ -117,6 +119,35 @@ def test_what_fusion_finds_of_the_mount_is_kept_for_the_next_start(run: Run, tmp
                     return
 
     run(scenario())
+
+
+def test_a_slow_disk_holds_nobody_up(run: Run, tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The disk is done once the loop, which goes on meanwhile, says so."""
+    loop_went_on = threading.Event()
+    kept: list[bool] = []
+    monkeypatch.setattr(calibration_node, "REPEAT_S", 0.02)
+    values = {"p": (0.0, 0.002, 0.0), "q": (0.0, 0.0, 0.0, 1.0), "sigma_p": 0.001, "sigma_q": 0.002}
+
+    async def scenario() -> None:
+        loop, done = asyncio.get_running_loop(), asyncio.Event()
+
+        def keep(store: Store, body: Any) -> None:
+            loop.call_soon_threadsafe(loop_went_on.set)
+            kept.append(loop_went_on.wait(5.0))
+            loop.call_soon_threadsafe(done.set)
+
+        monkeypatch.setattr(Store, "keep", keep)
+        config = settings_with()
+        mount = MountCalibration(values=MountValues(**values, base=config.camera.mount_hash))
+        async with Service(config, Store(tmp_path, "user", "default")) as service:
+            with Bus.connect(service.endpoints) as other:
+                fusion = other.publisher("fusion")
+                await fusion.ready()
+                fusion.publish("user", "calibration", other.clock(), mount)
+                await done.wait()
+
+    run(scenario())
+    assert kept == [True]
 
 
 def test_a_second_calibration_has_to_wait_for_the_first(run: Run, bus: Bus) -> None:
