@@ -63,7 +63,7 @@ class _Serial:
 
 class _Tracker:
     def __init__(self, device: ImuDeviceSettings) -> None:
-        self._server = SlimeVrServer(device.acc_turn)
+        self._server = SlimeVrServer(lambda name: device.acc_turn)
         self._stamper = Stamper(device, None)
 
     @property

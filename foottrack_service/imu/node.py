@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import math
 from collections import Counter
 from functools import partial
 
@@ -130,6 +129,7 @@ class _TrackerFoot(_Foot):
         super().__init__(bus, user, side, device.format)
         self.wanted = None if device.port == "auto" else _tracker_name(device.port)
         self.stamper = Stamper(device, None)
+        self.acc_turn = device.acc_turn
 
     @property
     def mac(self) -> str | None:
@@ -141,8 +141,7 @@ async def _start_trackers(
     tasks: asyncio.TaskGroup, bus: Bus, settings: Settings, devices: dict[Side, ImuDeviceSettings]
 ) -> None:
     feet = [_TrackerFoot(bus, settings.user, side, device) for side, device in devices.items()]
-    turn = next((device.acc_turn for device in devices.values() if device.acc_turn is not None), None)
-    server = SlimeVrServer(None if turn is None else math.remainder(turn, 2.0 * math.pi))
+    server = SlimeVrServer(partial(_acc_turn, feet))
     for foot in feet:
         await foot.publisher.ready()
     bus.health.turned_away("slimevr", server.drops)
@@ -159,13 +158,23 @@ async def _start_trackers(
     tasks.create_task(_watch_trackers(bus, server, feet), name="slimevr watch")
 
 
+def _foot_of(feet: list[_TrackerFoot], name: str) -> _TrackerFoot | None:
+    """The foot that a sensor is on: first come, first served where none is named."""
+    found = next((foot for foot in feet if foot.wanted == name), None)
+    return found or next((foot for foot in feet if foot.wanted is None), None)
+
+
+def _acc_turn(feet: list[_TrackerFoot], name: str) -> float | None:
+    foot = _foot_of(feet, name)
+    return None if foot is None else foot.acc_turn
+
+
 def _on_tracker_sample(feet: list[_TrackerFoot], sample: TrackerSample, t_arr: int) -> None:
-    foot = next((foot for foot in feet if foot.wanted == sample.name), None)
+    foot = _foot_of(feet, sample.name)
     if foot is None:
-        foot = next((foot for foot in feet if foot.wanted is None), None)
-        if foot is None:
-            return
-        # First come, first served, and it stays so: which foot it is on is found by tapping.
+        return
+    if foot.wanted is None:
+        # It stays so: which foot it is on is found by tapping.
         foot.wanted = sample.name
         _log.info("%s: taken by tracker %s", foot.name, sample.name)
     stamped = foot.stamper.stamp(sample.sample, t_arr, None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -58,16 +59,17 @@ class _Tracker:
 
 
 class SlimeVrServer:
-    """Any number of trackers. ``acc_turn_rad`` turns accelerations about the chip's z, where a firmware's axes of
-    rotation and acceleration differ; None does what the tracker's protocol version calls for.
+    """Any number of trackers. ``acc_turn`` says by how much, rad, the accelerations of a sensor (its name as in
+    ``TrackerSample``) are turned about the chip's z, where a firmware's axes of rotation and acceleration differ; None
+    does what the tracker's protocol version calls for.
 
     A sample is complete with its acceleration, which follows its rotation. Drops: those of ``decode``, ``stranger`` (no
     handshake), ``late`` (overtaken on the way), ``unpaired``, ``crowded``.
     """
 
-    def __init__(self, acc_turn_rad: float | None = None) -> None:
+    def __init__(self, acc_turn: Callable[[str], float | None] = lambda name: None) -> None:
         self.drops: Counter[str] = Counter()
-        self._acc_turn_rad = acc_turn_rad
+        self._acc_turn = acc_turn
         self._trackers: dict[Address, _Tracker] = {}
         self._beat_due_s: float | None = None
 
@@ -141,7 +143,8 @@ class SlimeVrServer:
         return None if tracker is None else (tracker.name, tracker.handshake)
 
     def _sample(self, tracker: _Tracker, rotation: Rotation, acceleration: Acceleration) -> TrackerSample:
-        turn = self._acc_turn_rad
+        name = f"{tracker.name}/{acceleration.sensor}"
+        turn = self._acc_turn(name)
         if turn is None:
             turn = 0.0 if tracker.protocol >= CONSISTENT_PROTOCOL else BOARD_TURN_RAD
         linear, q = _turned(acceleration.linear, turn), rotation.q
@@ -152,7 +155,7 @@ class SlimeVrServer:
             accuracy=rotation.accuracy,
             age_us=round(min(tracker.round_trips_s, default=0.0) * 0.5e6),
         )
-        return TrackerSample(f"{tracker.name}/{acceleration.sensor}", sample)
+        return TrackerSample(name, sample)
 
 
 def _turned(v: Vec3, angle: float) -> Vec3:

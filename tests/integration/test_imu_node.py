@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import socket
 import sys
 from collections.abc import Callable
@@ -21,6 +22,7 @@ from foottrack_service.bus import Bus
 from foottrack_service.config import Settings
 from foottrack_service.imu import node
 from foottrack_service.imu.devices.slimevr import SlimeVrDevice
+from foottrack_service.imu.formats import slimevr
 
 
 class Listener:
@@ -150,16 +152,20 @@ def _state(bus: Bus, name: str) -> str | None:
     return None if health is None else health.state
 
 
-def test_slimevr_trackers_come_over_udp(bus: Bus, run: Any) -> None:
+@pytest.fixture
+def udp_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def test_slimevr_trackers_come_over_udp(bus: Bus, run: Any, udp_port: int) -> None:
     async def scenario() -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
         macs = {"left": "A0:00:00:00:00:01", "right": "A0:00:00:00:00:02"}
         settings = Settings(
             imu={
                 "slimevr_host": "127.0.0.1",
-                "slimevr_port": port,
+                "slimevr_port": udp_port,
                 "left": {"format": "slimevr", "port": macs["left"].lower()},
                 "right": {"format": "slimevr"},
             }
@@ -172,7 +178,7 @@ def test_slimevr_trackers_come_over_udp(bus: Bus, run: Any) -> None:
         trackers = []
         for mac in macs.values():
             transport, tracker = await loop.create_datagram_endpoint(
-                lambda mac=mac: Datagrams(SlimeVrDevice(mac)), remote_addr=("127.0.0.1", port)
+                lambda mac=mac: Datagrams(SlimeVrDevice(mac)), remote_addr=("127.0.0.1", udp_port)
             )
             trackers.append(transport)
             tasks.append(asyncio.create_task(tracker.run()))
@@ -185,6 +191,36 @@ def test_slimevr_trackers_come_over_udp(bus: Bus, run: Any) -> None:
             for message in listener.messages[f"imu/{side}"]:
                 check_at_rest(message, has_gyro=False, has_q=True)
                 assert message.data.t_dev is None
+
+    run(scenario())
+
+
+def test_each_foot_s_tracker_is_turned_as_its_own_setting_says(bus: Bus, run: Any, udp_port: int) -> None:
+    """The right one's accelerations are turned by half a turn about its z: flat, with 3 m/s^2 along its x."""
+    macs = {"left": "AA:00:00:00:00:01", "right": "AA:00:00:00:00:02"}
+    turns = {"left": 0.0, "right": math.pi}
+    devices = {side: {"format": "slimevr", "port": mac, "acc_turn": turns[side]} for side, mac in macs.items()}
+    settings = Settings(imu={**devices, "slimevr_host": "127.0.0.1", "slimevr_port": udp_port})
+
+    async def scenario() -> None:
+        listener = Listener(bus)
+        await listener.subscriber.ready()
+        running = asyncio.create_task(node.run(bus, settings))
+        await listener.until(lambda: _state(bus, "imu-left") == "starting")
+        loop = asyncio.get_running_loop()
+        for side, mac in macs.items():
+            transport, _ = await loop.create_datagram_endpoint(
+                asyncio.DatagramProtocol, remote_addr=("127.0.0.1", udp_port)
+            )
+            transport.sendto(slimevr.encode_handshake(slimevr.Handshake(22, "test", mac)))
+            both = [slimevr.encode_rotation(0, slimevr.Rotation(0, (0.0, 0.0, 0.0, 1.0), 3))]
+            both.append(slimevr.encode_acceleration(0, slimevr.Acceleration(0, (3.0, 0.0, 0.0))))
+            transport.sendto(slimevr.encode_bundle(1, both))
+            await listener.until(lambda side=side: listener.count(side) >= 1)  # type: ignore[misc]
+            transport.close()
+        await stopped(running)
+        felt = {side: listener.messages[f"imu/{side}"][0].data.acc[0] for side in macs}
+        assert felt == pytest.approx({"left": 3.0, "right": -3.0})
 
     run(scenario())
 

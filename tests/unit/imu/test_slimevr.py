@@ -24,7 +24,7 @@ MAC = "A0:B1:C2:D3:E4:F5"
 
 
 def connected(protocol: int = 22, acc_turn_rad: float | None = None) -> SlimeVrServer:
-    server = SlimeVrServer(acc_turn_rad)
+    server = SlimeVrServer(lambda name: acc_turn_rad)
     server.receive(slimevr.encode_handshake(Handshake(protocol, "0.5.4", MAC)), TRACKER, 0.0)
     return server
 
