@@ -20,6 +20,9 @@ SAME_TAP_S = 0.08
 PAUSE_S = (0.1, 1.2)
 """Between the two taps."""
 
+SILENT_S = 1.0
+"""A sensor that said nothing for so long is not waited for."""
+
 _SLOW_S = 0.25
 
 
@@ -55,7 +58,7 @@ class TapIdentifier:
             sensor.slow[2] + share * fast[2],
         )
         self._note(sensor, t, math.hypot(*fast))
-        return self._decide(min(other.t for other in self._sensors.values()))
+        return self._decide(min(other.t for other in self._sensors.values() if t - other.t < SILENT_S))
 
     def forget(self) -> None:
         """Begin anew, for the next sensor."""

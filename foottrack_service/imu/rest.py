@@ -12,6 +12,8 @@ from foottrack_protocol.frames import STANDARD_GRAVITY
 Array = npt.NDArray[np.float64]
 
 LEAST_REST_S = 1.0
+MAX_HOLE_S = 0.25
+"""Between two samples: what the foot did meanwhile is not known."""
 MAX_GYRO_SPREAD = 0.02
 """rad/s, rms about the mean: a sensor in a hand has ten times as much."""
 MAX_ACC_SPREAD = 0.15
@@ -53,6 +55,9 @@ def rest(t: npt.ArrayLike, acc: npt.ArrayLike, gyro: npt.ArrayLike | None) -> Re
     seconds = float(t[-1] - t[0]) if len(t) > 1 else 0.0
     if seconds < LEAST_REST_S:
         raise NotAtRest(f"only {seconds:.1f} s were seen, {LEAST_REST_S:g} are needed: is the sensor on?")
+    hole = float(np.max(np.diff(t)))
+    if hole > MAX_HOLE_S:
+        raise NotAtRest(f"nothing came for {hole:.1f} s: look at the sensor's cable or radio")
     if not np.all(np.isfinite(acc)):
         raise NotAtRest("an acceleration is not finite")
     spread = _spread(acc)

@@ -48,6 +48,13 @@ def test_what_is_no_rest_is_refused(acc: object, gyro: object, text: str) -> Non
         rest(T[: len(a)], a, g)
 
 
+def test_a_hole_is_no_rest() -> None:
+    acc, gyro = still()
+    seen = (T < 1.0) | (T > 1.5)
+    with pytest.raises(NotAtRest, match=r"nothing came for 0\.5 s"):
+        rest(T[seen], acc[seen], gyro[seen])
+
+
 def test_the_whole_bias_of_the_accelerometer_from_six_positions() -> None:
     true = np.array([0.2, -0.35, 0.1])
     rng = np.random.default_rng(1)
@@ -74,13 +81,14 @@ class Feet:
         self.identifier = TapIdentifier()
         self.rng = np.random.default_rng(2)
         self.t = 0.0
+        self.names: tuple[str, ...] = ("a", "b")
 
     def play(self, seconds: float, **hits: list[tuple[float, float]]) -> list[str]:
         """``hits`` by sensor: (s from now, m/s^2). Returns what was identified."""
         found = []
         begin = self.t
         while self.t < begin + seconds:
-            for name in ("a", "b"):
+            for name in self.names:
                 acc = np.array([0.0, STANDARD_GRAVITY, 0.0]) + self.rng.normal(scale=0.05, size=3)
                 for at, height in hits.get(name, []):
                     ringing = self.t - begin - at
@@ -115,6 +123,13 @@ def test_the_sensor_that_is_tapped_twice() -> None:
 )
 def test_what_is_no_tapping(hits: dict[str, list[tuple[float, float]]]) -> None:
     assert Feet().play(4.0, **hits) == []
+
+
+def test_a_sensor_that_fell_silent_is_not_waited_for() -> None:
+    feet = Feet()
+    assert feet.play(1.0) == []
+    feet.names = ("a",)
+    assert feet.play(4.0, a=[(2.0, 20.0), (2.4, 20.0)]) == ["a"]
 
 
 def test_a_tap_shakes_the_other_a_little() -> None:
