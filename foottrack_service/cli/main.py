@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import io
 import sys
 from typing import Annotated
 
@@ -77,6 +78,9 @@ def main() -> None:
     # live pose its p99.
     gc.freeze()
     gc.set_threshold(50_000, 20, 50)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # Windows' code pages lack letters of units and names, and a file's name may be no text at all.
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         app()
     except running.CommandFailed as error:

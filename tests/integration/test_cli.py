@@ -168,6 +168,15 @@ def test_what_a_person_can_get_wrong_is_one_helpful_line(
     assert len(done.stderr.strip().splitlines()) == (1 if "flying" not in args else done.stderr.strip().count("\n") + 1)
 
 
+def test_a_console_that_lacks_a_letter_ends_no_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As Windows has it where the output goes into a file."""
+    monkeypatch.setenv("PYTHONIOENCODING", "cp1252")
+    foottrack("walk", "new", "sneak", "--out", "mine.json", cwd=tmp_path)
+    project = json.loads((tmp_path / "mine.json").read_text(encoding="utf-8"))
+    (tmp_path / "mine.json").write_text(json.dumps({**project, "name": "\u221a2"}), encoding="utf-8")
+    assert "\\u221a2: stride" in foottrack("walk", "show", "mine.json", cwd=tmp_path).stdout
+
+
 def test_settings_are_written_commented_and_read_back(tmp_path: Path) -> None:
     foottrack("config", "init", cwd=tmp_path)
     found = json.loads(foottrack("config", "check", "--json", cwd=tmp_path).stdout)
