@@ -24,7 +24,7 @@ _TOGETHER_S = 0.02
 
 
 class FolderSource:
-    """Reads a sequence, as fast as it is read, or with `now` (bus clock, ns) from then on at its own pace.
+    """Reads a sequence, as fast as it is read, or with `now` (bus clock, ns) at its own pace from the first one on.
 
     At its own pace pictures that are due while nobody reads are missing, as their numbers show.
     """
@@ -45,13 +45,15 @@ class FolderSource:
         self._depth = _read_list(path / "depth.txt") if (path / "depth.txt").exists() else []
         if not self._colour:
             raise SourceError(f"{path / 'rgb.txt'} lists no pictures")
-        self._shift = 0 if now is None else now() - round(self._colour[0][0] * 1e9)
+        self._shift: int | None = 0 if now is None else None
         self._next = 0
 
     def read(self) -> Frame:
         """The next picture. Raises SourceEnded, and SourceError for a picture that cannot be read."""
         if not self._has(self._next):
             raise SourceEnded(f"{self._path} has {len(self._colour)} pictures")
+        if self._shift is None and self._now is not None:
+            self._shift = self._now() - round(self._colour[0][0] * 1e9)
         if self._now is not None:
             # As a camera does: who comes late has missed pictures.
             while self._has(self._next + 1) and self._taken(self._next + 1) <= self._now():
@@ -79,7 +81,7 @@ class FolderSource:
     def _taken(self, number: int) -> int:
         """Bus-clock ns at which a picture is taken, rounds counted on."""
         rounds, index = divmod(number, len(self._colour))
-        return round((self._colour[index][0] + rounds * self._duration()) * 1e9) + self._shift
+        return round((self._colour[index][0] + rounds * self._duration()) * 1e9) + (self._shift or 0)
 
     def _duration(self) -> float:
         """Of one round, the gap to the next included."""
