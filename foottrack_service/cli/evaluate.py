@@ -66,6 +66,8 @@ def evaluate(
     """
     if camera not in ("simulated", "rendered"):
         raise CommandFailed(f"--camera is simulated or rendered, not {camera!r}", EXIT_USAGE)
+    if html is not None and not html.parent.is_dir():
+        raise CommandFailed(f"--html {html}: there is no folder {html.parent}", EXIT_USAGE)
     sections = sections or ("tasks" if camera == "rendered" else ",".join(DEFAULT_SECTIONS))
     if gait:
         from foottrack_service.cli.evaluate_gait import evaluate_gait, show_gait

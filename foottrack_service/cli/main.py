@@ -89,9 +89,6 @@ def main() -> None:
         running.fail(str(error), running.EXIT_USAGE)
     except (BusError, ProtocolError, RecordingError, DatasetError) as error:
         running.fail(str(error))
-    except BrokenPipeError:
-        sys.stderr.close()
-        raise SystemExit(0) from None
     except OSError as error:
         # One that names a file is about a path that a person gave.
         if error.filename is None:

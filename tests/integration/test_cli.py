@@ -152,6 +152,7 @@ def test_ctrl_c_closes_a_recording_and_says_what_is_in_it(tmp_path: Path) -> Non
         (["evaluate", "--seeds", "one"], 2, "whole numbers"),
         (["evaluate", "--real", "nowhere"], 1, "imu_sample.csv"),
         (["config", "check", "--config", "typo.toml"], 2, "heihgt"),
+        (["evaluate", "--tasks", "steps", "--html", "nowhere/x.html"], 2, "no folder nowhere"),
         (["config", "init", "nowhere/foottrack.toml"], 1, "nowhere/foottrack.toml: No such file"),
         (["sim", "--seconds", "4000", "--out", "x.mcap"], 2, "1 to 3600 s"),
         (["log", "import", "walk.msgpack", "--out", "x.mcap", "--config", "latin.toml"], 2, "latin.toml"),
