@@ -74,3 +74,9 @@ def test_an_answer_that_is_none_is_told(godot: GodotProject, fake: FakeService, 
         peer.send(message(number, b"", answer))
         (told,) = run.until("answers")["answers"]
     assert told["error"]["code"] == "bad_answer"
+
+
+def test_a_client_in_no_scene_can_still_be_asked(godot: GodotProject) -> None:
+    for said in godot.run("outside.gd").values():
+        assert 1.0 <= said.pop("age") < 2.0
+        assert said == {"synchronised": False, "connected": False, "bus_time": True, "statistics": {}}

@@ -68,6 +68,8 @@ func _enter_tree() -> void:
 func _exit_tree() -> void:
 	_thread.stop()
 	_thread = null
+	_was_connected = false
+	_trouble = ""
 	for id: int in _unanswered.keys():
 		_answer(id, RequestLink.failure(RequestLink.TIMEOUT, "the client left the scene"))
 
@@ -95,19 +97,19 @@ func newest(stream: String) -> Message:
 
 ## The bus clock now, ns. Only an estimate as long as the client is not `is_synchronised`.
 func bus_time() -> int:
-	return Time.get_ticks_usec() * 1000 + _thread.offset()
+	return Time.get_ticks_usec() * 1000 + (_thread.offset() if _thread != null else 0)
 
 
 ## Seconds from when a message was true until now. Before the clocks are synchronised: since it came.
 func age(message: Message) -> float:
-	if not _thread.is_synchronised():
+	if not is_synchronised():
 		return (Time.get_ticks_usec() - message.arrival_usec) * 1e-6
 	return (bus_time() - message.t) * 1e-9
 
 
 ## Whether the bus clock is known, so that what is published is valid.
 func is_synchronised() -> bool:
-	return _thread.is_synchronised()
+	return _thread != null and _thread.is_synchronised()
 
 
 ## Whether the bus is there.
@@ -116,8 +118,10 @@ func is_connected_to_bus() -> bool:
 
 
 ## Publishes one of the user's streams, true at `t_usec` of `Time.get_ticks_usec()`. What cannot be sent now is counted
-## and leaves a gap in `seq`.
+## and leaves a gap in `seq`; in no scene it is nothing.
 func publish(stream: String, t_usec: int, data: Dictionary, valid := true) -> void:
+	if _thread == null:
+		return
 	var message := Message.new()
 	message.user = user
 	message.stream = stream
@@ -149,9 +153,9 @@ func request(cmd: String, args := {}, timeout_s := 2.0) -> Dictionary:
 	return {}
 
 
-## Counters: connections, messages, gaps and refusals by topic, what was sent and not.
+## Counters: connections, messages, gaps and refusals by topic, what was sent and not; empty in no scene.
 func statistics() -> Dictionary:
-	return _thread.state()
+	return _thread.state() if _thread != null else {}
 
 
 func _answer(id: int, answer: Dictionary) -> void:
