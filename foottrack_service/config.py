@@ -59,6 +59,8 @@ class BodySettings(Section):
     torso: Positive | None = None
     hip_width: Positive | None = None
     hip_back: Float | None = None
+    neck_down: Positive | None = Field(default=None, description="what the head nods about, below the eyes")
+    neck_back: Float | None = Field(default=None, description="the same, behind the eyes")
     solver: Literal["two-bone", "fabrik"] = Field(
         default="two-bone", description="hips by trunk and legs, or by a spine with joint limits besides (FABRIK)"
     )

@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from foottrack_protocol.messages import Side
-from foottrack_service.body.skeleton import EYES_ABOVE_NECK, EYES_BEFORE_NECK, Skeleton
+from foottrack_service.body.skeleton import Skeleton
 from foottrack_service.body.vectors import Quaternion, Vec, add, along, norm, sub, turned, unit
 
 REACH = 0.99
@@ -50,9 +50,9 @@ class Hips(NamedTuple):
     joints: dict[Side, Vec]
 
 
-def neck(head_p: Sequence[float], head_q: Sequence[float]) -> Vec:
+def neck(head_p: Sequence[float], head_q: Sequence[float], body: Skeleton) -> Vec:
     """The point that the head nods about, m: so a look down does not lower the hips."""
-    x, y, z = turned(head_q, (0.0, -EYES_ABOVE_NECK, EYES_BEFORE_NECK))
+    x, y, z = turned(head_q, (0.0, -body.neck_down, body.neck_back))
     return (head_p[0] + x, head_p[1] + y, head_p[2] + z)
 
 
@@ -62,7 +62,7 @@ def hips_below(top: Vec, facing: Facing, ankles: Mapping[Side, Vec], body: Skele
     The trunk keeps its length. With both feet, a neck that is ahead of where it would be over them leans, as far as
     its drop allows, and the rest of the drop is the legs'; with fewer feet nothing tells a lean from a crouch.
     """
-    rise, ahead = body.torso - EYES_ABOVE_NECK, body.hip_back - EYES_BEFORE_NECK
+    rise, ahead = body.torso - body.neck_down, body.hip_back - body.neck_back
     lean = _lean(top, facing, ankles, body, rise, ahead) if len(ankles) == 2 else 0.0
     length = math.hypot(rise, ahead)
     over = min(ahead + lean, 0.999 * length)

@@ -26,7 +26,10 @@ EYES_BEFORE_NECK = 0.085
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:
-    """Lengths in m. ``torso`` is from the eyes down to the hips' centre, ``hip_back`` how far behind them that is."""
+    """Lengths in m. ``torso`` is from the eyes down to the hips' centre, ``hip_back`` how far behind them that is.
+
+    The neck, which the head nods about, lies ``neck_down`` below the eyes of a level head, and ``neck_back`` behind.
+    """
 
     height: float
     thigh: float
@@ -34,6 +37,8 @@ class Skeleton:
     torso: float
     hip_width: float
     hip_back: float
+    neck_down: float = EYES_ABOVE_NECK
+    neck_back: float = EYES_BEFORE_NECK
 
     @classmethod
     def of(cls, body: BodySettings) -> Skeleton:
@@ -46,9 +51,11 @@ class Skeleton:
             torso=body.torso or (EYE_HEIGHT - _HIP_HEIGHT) * tall,
             hip_width=body.hip_width or _HIP_WIDTH * tall,
             hip_back=_HIP_BACK * tall if body.hip_back is None else body.hip_back,
+            neck_down=body.neck_down or EYES_ABOVE_NECK,
+            neck_back=EYES_BEFORE_NECK if body.neck_back is None else body.neck_back,
         )
 
     @classmethod
     def calibrated(cls, values: BodyValues) -> Skeleton:
         """From a calibration."""
-        return cls(values.height, values.thigh, values.shank, values.torso, values.hip_width, values.hip_back)
+        return cls.of(BodySettings(**values.model_dump()))

@@ -76,7 +76,7 @@ class BodySolver:
         facing = Facing.of(self.face(t, head_q, feet))
         ankles = {side: foot.p for side, foot in feet.items()}
         axes = {side: knee_axis(facing.right, facing.forward, foot.q) for side, foot in feet.items()}
-        top = posture.neck(head_p, head_q)
+        top = posture.neck(head_p, head_q, body)
         centre, pitch = posture.hips_below(top, facing, ankles, body)
         hips = posture.place(centre, pitch, facing, ankles, body)
         if self._solver == "fabrik" and feet:

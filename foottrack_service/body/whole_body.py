@@ -10,7 +10,7 @@ from foottrack_service.body.fabrik import Fabrik, Joint
 from foottrack_service.body.legs import knee
 from foottrack_service.body.limits import Cone, Hinge, Limit, Rigid
 from foottrack_service.body.posture import REACH, Facing
-from foottrack_service.body.skeleton import EYES_ABOVE_NECK, EYES_BEFORE_NECK, Skeleton
+from foottrack_service.body.skeleton import Skeleton
 from foottrack_service.body.vectors import Vec, along, cross, norm, sub, unit
 
 _HEAD, _NECK, _CHEST, _HIPS = range(4)
@@ -31,11 +31,11 @@ class WholeBody:
     """The tree of a person with these sides' feet. The head is its root: nothing is known better."""
 
     def __init__(self, body: Skeleton, sides: Sequence[Side]) -> None:
-        rise, ahead = body.torso - EYES_ABOVE_NECK, body.hip_back - EYES_BEFORE_NECK
+        rise, ahead = body.torso - body.neck_down, body.hip_back - body.neck_back
         bone = 0.5 * math.hypot(rise, ahead)
         joints = [
             Joint(None),
-            Joint(_HEAD, math.hypot(EYES_ABOVE_NECK, EYES_BEFORE_NECK)),
+            Joint(_HEAD, math.hypot(body.neck_down, body.neck_back)),
             Joint(_NECK, bone),
             Joint(_CHEST, bone),
         ]

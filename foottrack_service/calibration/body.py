@@ -1,4 +1,4 @@
-"""``calibrate/body``: the measures of a person who stands upright and looks ahead for 3 s."""
+"""``calibrate/body``: the measures of a person who stands upright and looks ahead for 3 s, and then nods, if so."""
 
 from __future__ import annotations
 
@@ -15,12 +15,19 @@ from foottrack_service.body.facing import head_yaw
 from foottrack_service.body.posture import HIPS_BEFORE_ANKLES, REACH
 from foottrack_service.body.skeleton import EYE_HEIGHT, EYES_ABOVE_NECK, EYES_BEFORE_NECK, Skeleton
 from foottrack_service.calibration.flow import Flow, Progress, Refused, not_still
+from foottrack_service.calibration.nod import LEAST_NOD, Neck, neck_of, nods_of
 from foottrack_service.calibration.stillness import StillHead
 from foottrack_service.config import BodySettings, Settings
 from foottrack_service.rotations import Array
 
 _FIRST = "Stand upright and still, feet together, and look straight ahead."
 UPRIGHT_S = 3.0
+NOD_S = 6.0
+"""For a look down and up again. Who does not nod has the neck that people have."""
+_NOD = "Now look down at your feet, and up again."
+_RAISED = math.radians(10.0)
+"""A head that comes back so near to where it was has nodded."""
+_USUAL = Neck(EYES_ABOVE_NECK, EYES_BEFORE_NECK)
 MOST_NOD = math.radians(25.0)
 """A head that nods further is not level, and its eyes are not at their height."""
 MOST_OFF = 0.07
@@ -44,8 +51,11 @@ class BodyFlow(Flow):
         self._settings, self._height, self._floor = settings, height, floor
         self._head = StillHead()
         self._level_since: int | None = None
-        self._nods = False
+        self._nods = self._nodded = False
         self._feet: deque[tuple[int, Array]] = deque()
+        self._stood: tuple[Array, Array] | None = None
+        """Places and turns of the head while it stood, once it has."""
+        self._nod: list[tuple[float, Array, Array]] = []
         self.progress = Progress(0.0, _FIRST)
 
     def _take(self, message: Message, now: int) -> None:
@@ -60,11 +70,24 @@ class BodyFlow(Flow):
                 self._level_since = None
             elif self._level_since is None:
                 self._level_since = message.t
-            self._try(message.t)
+            if self._stood is None:
+                self._try(message.t)
+            else:
+                self._watch_nod(message.t * 1e-9, np.array(message.data.p), q)
+
+    def tick(self, now: int) -> None:
+        """The time. Who has stood has measures, whether or not a nod was seen."""
+        try:
+            super().tick(now)
+        except Refused:
+            if self._stood is None:
+                raise
+            self._finish(_USUAL)
 
     def _on_untracked(self) -> None:
         self._head.reset()
-        self.progress = Progress(0.0, _FIRST)
+        if self._stood is None:
+            self.progress = Progress(0.0, _FIRST)
 
     def _on_feet(self, t: int, body: BodyPose) -> None:
         feet = (body.left, body.right)
@@ -83,16 +106,32 @@ class BodyFlow(Flow):
             return
         stood = (t - max(self._level_since, self._head.since)) * 1e-9
         if stood < UPRIGHT_S:
-            self.progress = Progress(stood / UPRIGHT_S, "Good. Stay like that.")
+            self.progress = Progress(0.5 * stood / UPRIGHT_S, "Good. Stay like that.")
             return
-        self._finish()
+        self._stood = self._head.poses(UPRIGHT_S)
+        self._values(_USUAL)
+        self.progress = Progress(0.6, _NOD)
 
-    def _finish(self) -> None:
-        places, turns = self._head.poses(UPRIGHT_S)
+    def _watch_nod(self, t: float, p: Array, q: Array) -> None:
+        assert self._stood is not None
+        self._nod.append((t, p, q))
+        looks = nods_of(np.array([self._stood[1][-1], q]))
+        self._nodded = self._nodded or looks[0] - looks[1] > LEAST_NOD
+        if (self._nodded and looks[0] - looks[1] < _RAISED) or t - self._nod[0][0] > NOD_S:
+            times, places, turns = (np.array(column) for column in zip(*self._nod, strict=True))
+            self._finish(neck_of(times, places, turns) or _USUAL)
+
+    def _finish(self, neck: Neck) -> None:
+        self.found = BodyCalibration(values=self._values(neck))
+        self.progress = Progress(1.0, f"You are {self.found.values.height:.2f} m tall.")
+
+    def _values(self, neck: Neck) -> BodyValues:
+        assert self._stood is not None
+        places, turns = self._stood
         # What the eyes' place would be if the head were quite level.
         yaw = rot.from_yaw([head_yaw(q) for q in turns])
-        necks = places + rot.rotate(turns, [0.0, -EYES_ABOVE_NECK, EYES_BEFORE_NECK])
-        level = (necks + rot.rotate(yaw, [0.0, EYES_ABOVE_NECK, -EYES_BEFORE_NECK])).mean(axis=0)
+        necks = places + rot.rotate(turns, [0.0, -neck.down, neck.back])
+        level = (necks + rot.rotate(yaw, [0.0, neck.down, -neck.back])).mean(axis=0)
         eyes = float(level[1]) - self._floor
         height = self._height or eyes / EYE_HEIGHT
         expected = EYE_HEIGHT * height
@@ -110,17 +149,17 @@ class BodyFlow(Flow):
             )
         body = Skeleton.of(BodySettings(height=height))
         ankle = 0.5 * (self._settings.feet.left.ankle_height + self._settings.feet.right.ankle_height)
-        self.found = BodyCalibration(
-            values=BodyValues(
-                height=height,
-                thigh=body.thigh,
-                shank=body.shank,
-                torso=eyes - ankle - REACH * (body.thigh + body.shank),
-                hip_width=body.hip_width,
-                hip_back=self._hip_back(level, rot.rotate(yaw[-1], [0.0, 0.0, -1.0]), body.hip_back),
-            )
+        measured = neck is not _USUAL
+        return BodyValues(
+            height=height,
+            thigh=body.thigh,
+            shank=body.shank,
+            torso=eyes - ankle - REACH * (body.thigh + body.shank),
+            hip_width=body.hip_width,
+            hip_back=self._hip_back(level, rot.rotate(yaw[-1], [0.0, 0.0, -1.0]), body.hip_back),
+            neck_down=neck.down if measured else None,
+            neck_back=neck.back if measured else None,
         )
-        self.progress = Progress(1.0, f"You are {height:.2f} m tall.")
 
     def _hip_back(self, eyes: Array, forward: Array, otherwise: float) -> float:
         if not self._feet:

@@ -60,7 +60,7 @@ class Store:
         layer: dict[str, Any] = {}
         for body in self.load():
             if isinstance(body, BodyCalibration):
-                layer["body"] = body.values.model_dump(mode="json")
+                layer["body"] = body.values.model_dump(mode="json", exclude_none=True)
             elif isinstance(body, ImuCalibration):
                 placed = body.values.model_dump(mode="json", include={"p", "q"})
                 layer.setdefault("feet", {})[body.values.side] = {"imu": placed}

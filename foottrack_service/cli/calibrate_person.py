@@ -94,7 +94,7 @@ def body(
     connect: ConnectOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Take the person's measures: stand upright for 3 s and look straight ahead. The service has to run.
+    """Take the person's measures: stand upright for 3 s, look straight ahead, then nod. The service has to run.
 
     Example: foottrack calibrate body --height 1.78
     """
@@ -102,8 +102,9 @@ def body(
     args = {} if height is None else {"height": height}
     values = _calibrated(settings, "body", args, BodyFlow(settings, height), countdown, as_json)
     if values is not None:
-        names = ("height", "thigh", "shank", "torso", "hip_width", "hip_back")
-        typer.echo(", ".join(f"{name.replace('_', ' ')} {values[name]:.2f} m" for name in names))
+        typer.echo(", ".join(f"{name.replace('_', ' ')} {value:.2f} m" for name, value in values.items() if value))
+        if values["neck_down"] is None:
+            typer.echo("no nod was seen: the neck is where most people have it")
 
 
 def mount(

@@ -10,7 +10,7 @@ import numpy as np
 from foottrack_protocol.messages import Side
 from foottrack_service.config import Settings
 from foottrack_service.rotations import Array
-from foottrack_service.simulation.easing import ease
+from foottrack_service.simulation.easing import ease, there_and_back
 from foottrack_service.simulation.footwear import Feet
 from foottrack_service.simulation.people import scene
 from foottrack_service.simulation.posture import Bearing
@@ -26,10 +26,10 @@ class Announced(NamedTuple):
     text: str
 
 
-ROUND_S = 28.0
+ROUND_S = 29.0
 """Shorter than any calibration waits: whenever one is begun, it sees what it asks for."""
-_AHEAD_S, _STEP_S, _THERE_S, _TURN_S = 8.0, 15.0, 18.0, 23.0
-"""Within a round: raises the head, steps forward, stands there, turns round. Before the first it looks down."""
+_AHEAD_S, _NOD_AT_S, _STEP_S, _TURN_S = 8.0, 13.0, 19.0, 24.0
+"""Within a round: raises the head, nods, steps forward, turns round. Before the first it looks down."""
 _NOD_S = 1.5
 _DOWN, _LEVEL = math.radians(60.0), math.radians(5.0)
 _STEP = 0.5
@@ -59,8 +59,8 @@ def announced(seconds: float) -> list[Announced]:
         said += [
             Announced(begin, "stands and looks down at the feet: what calibrate floor asks for"),
             Announced(begin + _AHEAD_S, "looks straight ahead: what calibrate body asks for, and heading first"),
+            Announced(begin + _NOD_AT_S, "looks down at the feet and up again: what calibrate body asks for then"),
             Announced(begin + _STEP_S, "takes one step forward: what calibrate heading asks for then"),
-            Announced(begin + _THERE_S, "stands there"),
             Announced(begin + _TURN_S, "turns round"),
         ]
     return said
@@ -79,4 +79,5 @@ def _look_down(t: Array) -> Array:
     """(n,) rad."""
     at = np.mod(t, ROUND_S)
     raised = ease((at - _AHEAD_S) / _NOD_S) - ease((at - _TURN_S) / _NOD_S)
+    raised -= there_and_back(at, _NOD_AT_S, _NOD_AT_S + 2.0 * _NOD_S)
     return np.asarray(_DOWN + (_LEVEL - _DOWN) * raised)

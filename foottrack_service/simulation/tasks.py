@@ -53,7 +53,7 @@ TASKS: dict[str, Task] = {
         Task("s-curve", "a normal walk along an S", 20.0, people.s_walk),
         Task(
             "calibration",
-            "does what calibrate floor, body and heading ask for, round after round of 28 s, and says when",
+            "does what calibrate floor, body and heading ask for, round after round of 29 s, and says when",
             10.0 * calibrating.ROUND_S,
             calibrating.calibration,
             calibrating.announced,

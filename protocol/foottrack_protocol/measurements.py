@@ -151,6 +151,10 @@ class BodyValues(Body):
     torso: Length = Field(description="head down to the hips' centre")
     hip_width: Length = Field(description="between the hip joints")
     hip_back: Coordinate = Field(description="hips' centre behind the head, along the head's yaw")
+    neck_down: Length | None = Field(
+        default=None, description="what the head nods about, below it; nil when not measured"
+    )
+    neck_back: Coordinate | None = Field(default=None, description="the same, behind it; nil when not measured")
 
 
 class MountValues(Body):

@@ -168,7 +168,7 @@ def test_many_levels_of_promises(count: int, opener: bytes) -> None:
 
 
 @pytest.mark.parametrize(("topic", "entry"), ENTRIES, ids=[topic for topic, _ in ENTRIES])
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_valid_bodies_go_round(topic: str, entry: Topic, data: st.DataObject) -> None:
     body = data.draw(bodies(entry))

@@ -208,7 +208,7 @@ def test_a_floor_that_was_kept_is_the_one_that_a_body_is_measured_from(run: Run,
         assert found["values"]["height"] == pytest.approx(1.6 / 0.936)
         assert said[0].startswith("Stand upright") and said[-1] == "Done. Thank you."
         assert "Good. Stay like that." in said
-        assert len(rings) == 3
+        assert len(rings) == 4
 
     run(scenario())
 
@@ -239,13 +239,14 @@ def test_a_person_who_does_what_is_said_is_calibrated_by_all_three_commands(run:
             client = config.model_copy(update={"bus": service.endpoints})
             person = simulate("calibration", 1, settings=config, seconds=60.0, depth=False)
             play = asyncio.ensure_future(simulation.run(service.bus, config, person))
-            for kind, flow in (("floor", FloorFlow), ("heading", HeadingFlow), ("body", BodyFlow)):
+            for kind, flow in (("floor", FloorFlow), ("body", BodyFlow), ("heading", HeadingFlow)):
                 said = heard[kind] = []
                 found[kind] = (await ask(client, kind, {}, flow(client), 0, said.append, lambda: None))["values"]
             play.cancel()
         assert abs(found["floor"]["height"]) < 0.02
         assert abs(found["heading"]["yaw"]) < 0.05
         assert found["body"]["height"] == pytest.approx(1.75, abs=0.02)
+        assert found["body"]["neck_down"] == pytest.approx(0.12, abs=0.012)
         assert {body.kind for body in store.load()} >= {"floor", "body"}
         assert heard["floor"] == [heard["floor"][0], "Done. Thank you."]
         assert "Now take one step forward, and stand still." in heard["heading"]

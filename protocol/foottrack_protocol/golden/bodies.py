@@ -131,6 +131,8 @@ CALIBRATIONS: tuple[dict[str, Any], ...] = (
             "torso": 0.75,
             "hip_width": 0.1875,
             "hip_back": 0.078125,
+            "neck_down": 0.125,
+            "neck_back": 0.09375,
         },
     },
     {

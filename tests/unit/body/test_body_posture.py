@@ -34,7 +34,7 @@ def test_a_look_down_does_not_move_the_hips() -> None:
     for pitch in np.radians([-70.0, -30.0, 0.0, 20.0]):
         q = rot.from_axis_angle([1.0, 0.0, 0.0], pitch)
         eyes = pivot + rot.rotate(q, [0.0, EYES_ABOVE_NECK, -EYES_BEFORE_NECK])
-        assert np.allclose(neck(eyes, q.tolist()), pivot)
+        assert np.allclose(neck(eyes, q.tolist(), BODY), pivot)
 
 
 def test_a_bow_sends_the_hips_back_and_keeps_the_trunk_s_length() -> None:

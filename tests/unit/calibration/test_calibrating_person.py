@@ -38,11 +38,11 @@ def test_whenever_a_calibration_is_begun_it_succeeds_while_it_waits(second) -> N
     assert abs(floor.height) < 0.02
     body, told = begun_at(BodyFlow(SETTINGS), second)
     assert body.height == pytest.approx(1.75, abs=0.02)
-    assert told[-2:] == ["Good. Stay like that.", f"You are {body.height:.2f} m tall."]
+    assert told[-2:] == ["Now look down at your feet, and up again.", f"You are {body.height:.2f} m tall."]
     heading, told = begun_at(HeadingFlow(SETTINGS), second)
     # In the second round the person faces the other way.
     assert abs(math.remainder(heading.yaw, math.pi)) < 0.05
-    assert (abs(heading.yaw) > 3.0) == (second > 12)
+    assert (abs(heading.yaw) > 3.0) == (second > 17)
     assert told[-2].startswith("Now take one step")
 
 
@@ -62,8 +62,8 @@ def test_what_it_does_is_said_when_its_time_has_come(capsys) -> None:
     say = said("calibration", 2.0 * ROUND_S)
     say(7.9)
     assert capsys.readouterr().err.splitlines() == [f"0:00 {announced(ROUND_S)[0].text}"]
-    say(36.0)
+    say(37.0)
     lines = capsys.readouterr().err.splitlines()
-    assert [line.split()[0] for line in lines] == ["0:08", "0:15", "0:18", "0:23", "0:28", "0:36"]
+    assert [line.split()[0] for line in lines] == ["0:08", "0:13", "0:19", "0:24", "0:29", "0:37"]
     said("walk", 30.0)(30.0)
     assert capsys.readouterr().err == ""

@@ -21,7 +21,7 @@ from calibration_people import (
 from foottrack_protocol.control import Code
 from foottrack_protocol.messages import MountValues
 from foottrack_service import rotations as rot
-from foottrack_service.calibration.body import BodyFlow
+from foottrack_service.calibration.body import NOD_S, BodyFlow
 from foottrack_service.calibration.floor import FloorFlow
 from foottrack_service.calibration.flow import Refused
 from foottrack_service.calibration.heading import HeadingFlow
@@ -116,7 +116,7 @@ def test_a_foot_on_a_step_is_no_floor(monkeypatch) -> None:
 @pytest.mark.parametrize("height", [1.62, 1.90])
 @pytest.mark.parametrize("known", [True, False])
 def test_the_body_of_a_person_who_stands_upright(monkeypatch, height, known) -> None:
-    run = scenario(monkeypatch, standing(LOOKING_AHEAD), person(height), seconds=6.0)
+    run = scenario(monkeypatch, standing(LOOKING_AHEAD), person(height), seconds=11.0)
     flow = BodyFlow(Settings(), height if known else None, floor=0.03)
     told = watch(flow, raised(run.messages(), 0.03))
     values = flow.found.values
@@ -126,15 +126,26 @@ def test_the_body_of_a_person_who_stands_upright(monkeypatch, height, known) -> 
     assert "Good. Stay like that." in told
 
 
-def test_it_takes_three_seconds_of_standing(monkeypatch) -> None:
-    run = scenario(monkeypatch, standing(LOOKING_AHEAD), person(1.75), seconds=6.0)
-    flow = BodyFlow(person(1.75))
+def test_it_takes_three_seconds_of_standing_and_waits_a_little_for_a_nod(monkeypatch) -> None:
+    run = scenario(monkeypatch, standing(LOOKING_AHEAD), person(1.75), seconds=12.0)
+    flow, asked = BodyFlow(person(1.75)), None
+    flow.begin(0)
     for arrival, message in run.messages():
         flow.take(message, arrival)
+        if asked is None and flow.progress.text.startswith("Now look down"):
+            asked = arrival / SECOND
         if flow.found is not None:
-            assert 3.0 < arrival / SECOND < 4.0
+            assert asked is not None and 3.0 < asked < 4.0
+            assert asked + NOD_S <= arrival / SECOND < asked + NOD_S + 0.2
             return
     pytest.fail("nothing was found")
+
+
+def test_who_stood_just_in_time_has_measures(monkeypatch) -> None:
+    run = scenario(monkeypatch, standing(LOOKING_AHEAD), person(1.75), seconds=5.0)
+    flow = BodyFlow(person(1.75))
+    watch(flow, run.messages(), until_s=60.0)
+    assert flow.found.values.height == pytest.approx(1.75, abs=0.015)
 
 
 def test_the_hips_are_where_the_feet_say(monkeypatch) -> None:
@@ -142,7 +153,7 @@ def test_the_hips_are_where_the_feet_say(monkeypatch) -> None:
     settings = person(1.75)
     bearing = replace(LOOKING_DOWN, look_down=math.radians(24.0))
     flow = BodyFlow(settings)
-    run = scenario(monkeypatch, standing(bearing), settings, seconds=7.0)
+    run = scenario(monkeypatch, standing(bearing), settings, seconds=11.0)
     flow.begin(0)
     core = FusionCore(settings)
     messages = list(run.messages())

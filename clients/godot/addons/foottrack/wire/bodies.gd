@@ -71,6 +71,8 @@ static var _calibration := C.ByKind.new({
 		"torso": _not_negative,
 		"hip_width": _not_negative,
 		"hip_back": _number,
+		"neck_down": C.nilable(_not_negative),
+		"neck_back": C.nilable(_number),
 	}),
 	"mount": _calibrated("mount", {
 		"p": _vector,

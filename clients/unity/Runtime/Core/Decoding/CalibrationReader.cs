@@ -57,6 +57,8 @@ namespace Foottrack
                 else if (r.KeyIs(Names.Torso)) { body.Torso = r.ReadNotNegative(); seen |= 8; }
                 else if (r.KeyIs(Names.HipWidth)) { body.HipWidth = r.ReadNotNegative(); seen |= 16; }
                 else if (r.KeyIs(Names.HipBack)) { body.HipBack = r.ReadFloat(); seen |= 32; }
+                else if (r.KeyIs(Names.NeckDown)) { body.NeckDown = Optional.NotNegative(r); }
+                else if (r.KeyIs(Names.NeckBack)) { body.NeckBack = Optional.Float(r); }
                 else { r.Skip(); }
             }
             r.Require(seen == 63);

@@ -20,6 +20,7 @@ namespace Foottrack
 
         public static readonly byte[] Kind = Of("kind"), Values = Of("values"), Thigh = Of("thigh"),
             Shank = Of("shank"), Torso = Of("torso"), HipWidth = Of("hip_width"), HipBack = Of("hip_back"),
+            NeckDown = Of("neck_down"), NeckBack = Of("neck_back"),
             Yaw = Of("yaw"), ImuYaw = Of("imu_yaw"), AccBias = Of("acc_bias"), GyroBias = Of("gyro_bias"),
             SigmaP = Of("sigma_p"), SigmaQ = Of("sigma_q"), Base = Of("base");
 

@@ -21,6 +21,8 @@ namespace Foottrack
     public struct BodyValues
     {
         public double Height, Thigh, Shank, Torso, HipWidth, HipBack;
+        /// <summary>What the head nods about, from the eyes; null when it was not measured.</summary>
+        public double? NeckDown, NeckBack;
     }
 
     public struct FloorValues
