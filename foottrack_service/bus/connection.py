@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 import zmq
 
@@ -18,6 +18,8 @@ from foottrack_service.bus.security import credentials
 from foottrack_service.bus.subscriber import Subscriber
 from foottrack_service.bus.timesync import SyncedClock
 from foottrack_service.config import BusSettings
+
+M = TypeVar("M", Publisher, Subscriber, ControlClient)
 
 
 class Bus:
@@ -58,20 +60,17 @@ class Bus:
         """A source of messages called ``src``."""
         healthy = self.clock.fresh if isinstance(self.clock, SyncedClock) else None
         publisher = Publisher(self.context, self.settings.ingress, src, self.clock, healthy, self._credentials)
-        self._made.append(publisher)
-        return publisher
+        return self._keep(publisher)
 
     def subscriber(self, topics: Iterable[str] = ("",), policy: Policy = Policy.EVERY) -> Subscriber:
         """Messages whose topic begins with one of ``topics``."""
         subscriber = Subscriber(self.context, self.settings.egress, topics, policy, self.clock, self._credentials)
-        self._made.append(subscriber)
-        return subscriber
+        return self._keep(subscriber)
 
     def control(self) -> ControlClient:
         """Requests to the service."""
         client = ControlClient(self.context, self.settings.control, self._credentials)
-        self._made.append(client)
-        return client
+        return self._keep(client)
 
     def close(self) -> None:
         """Close all that was made here, and the context if it is our own."""
@@ -80,6 +79,12 @@ class Bus:
         self._made.clear()
         if self._own_context:
             self.context.term()
+
+    def _keep(self, made: M) -> M:
+        # A node that waits for its device makes and closes some at each try, for days.
+        self._made = [each for each in self._made if not each.closed]
+        self._made.append(made)
+        return made
 
     def __enter__(self) -> Self:
         return self

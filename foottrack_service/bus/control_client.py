@@ -46,6 +46,11 @@ class ControlClient:
             raise ControlTimeout(f"no answer to {cmd!r} within {timeout_s:g} s: {reason}") from None
         return _result(answer)
 
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed."""
+        return self._socket.closed
+
     def close(self) -> None:
         """Close; requests that wait end with ControlTimeout."""
         if not self._socket.closed:

@@ -137,6 +137,11 @@ class Publisher:
         self.sent += 1
         return True
 
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed."""
+        return self._socket.closed
+
     def close(self, linger_s: float = 1.0) -> None:
         """Close; what was sent may take so long to leave."""
         if not self._socket.closed:

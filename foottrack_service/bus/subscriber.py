@@ -161,6 +161,11 @@ class Subscriber:
         """Ask for more: messages whose topic begins with this, too. It takes a moment until the bus knows."""
         self._socket.subscribe(topic)
 
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed."""
+        return self._socket.closed
+
     def close(self) -> None:
         """Close; what was not read is lost. Iterations end."""
         if not self._socket.closed:

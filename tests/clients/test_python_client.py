@@ -13,6 +13,7 @@ from typing import Any
 
 import msgpack
 import pytest
+import zmq
 from client_traffic import FINAL, POSE, frames, step
 from fake_service import COMMAND, FakeService, frame, message, rude_greetings
 from live_service import LiveService
@@ -285,6 +286,20 @@ def test_a_service_that_is_not_there_is_told_in_words(run: Run) -> None:
                 await client.request("hello", 0.05)
 
     run(scenario())
+
+
+def test_who_tries_again_and_again_does_not_run_out_of_sockets(run: Run) -> None:
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    context.max_sockets = 12
+
+    async def scenario() -> None:
+        with AsyncClient(NOBODY, context=context) as client:
+            for _ in range(30):
+                with pytest.raises(NotReady):
+                    await client.publisher("x", 0.01)
+
+    run(scenario())
+    context.term()
 
 
 @pytest.mark.parametrize("first", ["7701", "tcp://127.0.0.1", "tcp://127.0.0.1:65534", "ipc://x:1"])

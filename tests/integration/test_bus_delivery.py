@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import random
 import threading
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -348,3 +350,17 @@ def test_closing_ends_the_iteration(run: Run, bus: Bus) -> None:
         return [item async for item in subscriber]
 
     assert run(scenario()) == []
+
+
+def test_what_is_made_and_closed_for_days_is_forgotten(bus: Bus, run: Run) -> None:
+    async def scenario() -> None:
+        made: list[Any] = [bus.publisher("truth"), bus.subscriber(), bus.control()]
+        remembered = [weakref.ref(each) for each in made]
+        while made:
+            made.pop().close()
+        bus.publisher("truth").close()
+        await asyncio.sleep(0)
+        gc.collect()
+        assert [each() for each in remembered] == [None, None, None]
+
+    run(scenario())

@@ -81,6 +81,11 @@ class AsyncSubscription:
         self._waiting.clear()
         return messages
 
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed."""
+        return self._socket.closed
+
     def close(self) -> None:
         """Close; what was not read is lost."""
         self._revival.close()
@@ -141,19 +146,23 @@ class AsyncClient:
         """As ``Client.subscribe``."""
         wanted = prefixes(self.user, streams)
         subscription = AsyncSubscription(self._context, self.endpoints.egress, wanted, self.clock, self._keys)
+        self._made = [each for each in self._made if not each.closed]
         self._made.append(subscription)
         return subscription
 
     async def publisher(self, src: str, timeout_s: float = 5.0) -> Publisher:
         """A source of messages called ``src``, ready. It never blocks. Raises NotReady."""
         publisher = Publisher(self._plain, self.endpoints.ingress, src, self.user, self.clock, self._keys)
+        self._made = [each for each in self._made if not each.closed]
         self._made.append(publisher)
         try:
             async with asyncio.timeout(timeout_s):
                 while not publisher.live:  # noqa: ASYNC110 - only the socket itself can tell
                     await asyncio.sleep(_LOOK_S)
         except TimeoutError:
-            raise NotReady(publisher.why_not) from None
+            why_not = publisher.why_not
+            publisher.close(0.0)
+            raise NotReady(why_not) from None
         return publisher
 
     async def request(self, cmd: str, timeout_s: float = 2.0, **args: Any) -> Any:

@@ -70,6 +70,11 @@ class Subscription:
         self._waiting.clear()
         return messages
 
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed."""
+        return self._socket.closed
+
     def close(self) -> None:
         """Close; what was not read is lost."""
         self._revival.close()
@@ -129,15 +134,16 @@ class Client:
 
     def subscribe(self, *streams: str) -> Subscription:
         """The user's streams, such as "pose/body"; "sys/..." are the service's; none is everything of the user."""
-        subscription = Subscription(
-            self._context, self.endpoints.egress, prefixes(self.user, streams), self.clock, self._keys
-        )
+        wanted = prefixes(self.user, streams)
+        subscription = Subscription(self._context, self.endpoints.egress, wanted, self.clock, self._keys)
+        self._made = [each for each in self._made if not each.closed]
         self._made.append(subscription)
         return subscription
 
     def publisher(self, src: str) -> Publisher:
         """A source of messages called ``src``."""
         publisher = Publisher(self._context, self.endpoints.ingress, src, self.user, self.clock, self._keys)
+        self._made = [each for each in self._made if not each.closed]
         self._made.append(publisher)
         return publisher
 
