@@ -59,8 +59,9 @@ TILT_IMPOSSIBLE = 0.9
 """rad: and beyond this it is not our tag, wherever it is."""
 BLOB_SIGMA = 0.025
 """m per axis: shoes and views differ."""
-BLOB_WANDER = 0.01
-"""m per axis: as other parts of the shoe come into view; the same for many pictures."""
+BLOB_WANDER = 0.025
+"""m per axis: as other parts of the shoe come into view; the same for many pictures, so it counts more than its 1 cm:
+blobs pulled a foot that had swung for half a second off by 2 cm."""
 BLOB_CORRELATED = 20.0
 """Pictures after which a blob says something new."""
 

@@ -55,14 +55,14 @@ def fix(t: int, p: tuple[float, float, float]) -> OpticalFix:
 
 
 def fed(latency_ms: int) -> InertialFilter:
-    """A foot that is pushed about, with fixes that arrive so late."""
+    """A foot that is pushed and turned about, with fixes that arrive so late."""
     filter_ = InertialFilter(FootSettings(), "left", floor=True)
     random = np.random.default_rng(4)
     acc = np.cumsum(0.3 * random.normal(size=(400, 3)), axis=0) * 0.2 + [0.0, 9.80665, 0.0]
     due: list[OpticalFix] = []
     for i in range(400):
         t = i * 5 * MS
-        filter_.on_imu(ImuSample(t, acc[i], 0.1 * random.normal(size=3), None))
+        filter_.on_imu(ImuSample(t, acc[i], 0.6 * random.normal(size=3), None))
         if i % 4 == 0 and i < 380:
             due.append(fix(t - 2 * MS, (-0.1, -1.55, -0.15)))
         for each in [each for each in due if each.t + latency_ms * MS <= t]:
@@ -72,14 +72,10 @@ def fed(latency_ms: int) -> InertialFilter:
 
 
 def test_a_late_fix_ends_where_a_punctual_one_does() -> None:
+    # It turns too fast to stand: whether a foot stands is decided when its sample comes, by what is known then.
     punctual, late = fed(5).state, fed(60).state
-    assert np.allclose(punctual[0][:6], late[0][:6], atol=5e-3)
-    # Such pushes say little about the yaw and the biases, and whether a foot stands is decided when its sample comes.
-    sigma = np.sqrt(punctual[1].diagonal())
-    turn = rot.to_rotation_vector(rot.multiply(punctual[0][6:10], rot.conjugate(late[0][6:10])))
-    assert (np.abs(turn) < sigma[6:9]).all()
-    assert (np.abs(punctual[0][10:] - late[0][10:]) < sigma[9:]).all()
-    assert np.allclose(sigma, np.sqrt(late[1].diagonal()), rtol=0.1)
+    assert np.allclose(punctual[0], late[0], rtol=0.0, atol=1e-9)
+    assert np.allclose(punctual[1], late[1], rtol=1e-9, atol=1e-12)
 
 
 def test_no_fix_is_taken_from_before_the_ring_or_far_ahead() -> None:
