@@ -34,16 +34,23 @@ async def run(bus: Bus, settings: Settings) -> None:
     devices: dict[Side, ImuDeviceSettings] = {"left": settings.imu.left, "right": settings.imu.right}
     serial = {side: device.port for side, device in devices.items() if device.format in SERIAL_FORMATS}
     allotment = ports.Allotment(serial)
-    trackers: dict[Side, ImuDeviceSettings] = {}
-    async with asyncio.TaskGroup() as tasks:
-        for side, device in devices.items():
-            if device.format == "slimevr":
-                trackers[side] = device
-            elif side in serial:
-                foot = _SerialFoot(bus, settings.user, side, device, allotment)
-                tasks.create_task(foot.run(), name=f"imu {side}")
-        if trackers:
-            await _start_trackers(tasks, bus, settings, trackers)
+    wired: list[_SerialFoot] = []
+    trackers: list[_TrackerFoot] = []
+    for side, device in devices.items():
+        if device.format == "slimevr":
+            trackers.append(_TrackerFoot(bus, settings.user, side, device))
+        elif side in serial:
+            wired.append(_SerialFoot(bus, settings.user, side, device, allotment))
+    try:
+        async with asyncio.TaskGroup() as tasks:
+            for foot in wired:
+                tasks.create_task(foot.run(), name=foot.name)
+            if trackers:
+                await _start_trackers(tasks, bus, settings, trackers)
+    finally:
+        # Where the trackers' port is taken, the service tries again for as long as it runs.
+        for each in (*wired, *trackers):
+            each.publisher.close()
 
 
 class _Foot:
@@ -137,10 +144,7 @@ class _TrackerFoot(_Foot):
         return None if self.wanted is None else self.wanted.split("/")[0]
 
 
-async def _start_trackers(
-    tasks: asyncio.TaskGroup, bus: Bus, settings: Settings, devices: dict[Side, ImuDeviceSettings]
-) -> None:
-    feet = [_TrackerFoot(bus, settings.user, side, device) for side, device in devices.items()]
+async def _start_trackers(tasks: asyncio.TaskGroup, bus: Bus, settings: Settings, feet: list[_TrackerFoot]) -> None:
     server = SlimeVrServer(partial(_acc_turn, feet))
     for foot in feet:
         await foot.publisher.ready()

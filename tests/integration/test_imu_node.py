@@ -18,7 +18,7 @@ from worn_imus import TILT, Datagrams, Wearer, stopped
 from foottrack_protocol.frames import STANDARD_GRAVITY
 from foottrack_protocol.messages import Imu
 from foottrack_service import rotations
-from foottrack_service.bus import Bus
+from foottrack_service.bus import Bus, Publisher
 from foottrack_service.config import Settings
 from foottrack_service.imu import node
 from foottrack_service.imu.devices.slimevr import SlimeVrDevice
@@ -221,6 +221,31 @@ def test_each_foot_s_tracker_is_turned_as_its_own_setting_says(bus: Bus, run: An
         await stopped(running)
         felt = {side: listener.messages[f"imu/{side}"][0].data.acc[0] for side in macs}
         assert felt == pytest.approx({"left": 3.0, "right": -3.0})
+
+    run(scenario())
+
+
+def test_a_port_that_is_taken_costs_no_socket_however_often_it_is_tried(bus: Bus, run: Any, udp_port: int) -> None:
+    """SlimeVR's own server has it, and the service tries again every 10 s for as long as it runs."""
+    settings = Settings(imu={"left": {"format": "slimevr"}, "slimevr_host": "127.0.0.1", "slimevr_port": udp_port})
+    made: list[Publisher] = []
+
+    class Counted(Bus):
+        def publisher(self, src: str) -> Publisher:
+            made.append(super().publisher(src))
+            return made[-1]
+
+    async def scenario() -> None:
+        with (
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as theirs,
+            Counted.connect(bus.settings, bus.context) as counted,
+        ):
+            theirs.bind(("127.0.0.1", udp_port))
+            for _ in range(3):
+                with pytest.raises(ExceptionGroup, match="TaskGroup") as caught:
+                    await node.run(counted, settings)
+                assert caught.group_contains(OSError, match="for SlimeVR trackers")
+            assert len(made) == 3 and all(publisher.closed for publisher in made)
 
     run(scenario())
 
