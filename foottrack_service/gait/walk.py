@@ -238,6 +238,7 @@ class WalkingLegs:
         leg.z = leg.z * (1.0 - now) / (1.0 - before) if before < 1.0 else 0.0
         lift = min(max(_RETURN_LIFT * abs(leg.origin), _LEAST_LIFT), _LARGEST_LIFT)
         leg.extra = lift * math.sin(math.pi * share) ** 2
+        leg.extra_rate = lift * math.pi / lasts * math.sin(2.0 * math.pi * share)
         if share >= 1.0:
             self._returning = None
 

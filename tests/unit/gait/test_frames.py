@@ -39,6 +39,23 @@ def test_how_long_a_frame_is_does_not_show(cadence, peak):
         assert max(skates_m(t, target[:, 0], target[:, 1], speed, down)) < 0.003
 
 
+@pytest.mark.parametrize("pause", [1.9, 2.0, 2.1, 2.2, 2.3, 2.4])
+def test_a_step_amid_the_legs_return_under_the_hips_does_not_drop_them(pause):
+    left, right = marching(2.0, 0.2, 4.0)
+    again = max(left.begins[-1], right.begins[-1]) + left.swing + pause
+    for foot in (left, right):
+        foot.begins.append(again)
+        foot.peaks.append(0.2)
+        foot.turns.append(0.0)
+        again += 0.5
+    gait, t = Gait(WEARER, GaitSettings()), np.arange(0.0, again, 0.005)
+    y = []
+    for now in t:
+        ik = gait.update(round(now * 1e9), left.sample(now), right.sample(now), None, 0.0).ik
+        y.append([ik.left.p[1], ik.right.p[1]])
+    assert np.max(jumps_m(t, np.array(y))) < 0.0007
+
+
 @pytest.mark.parametrize("sink", [0.05, 0.1])
 def test_a_foot_that_is_measured_below_the_floor_brakes_before_it(sink):
     t, _, feet = walked(2.5, 0.35, sink)
