@@ -110,9 +110,10 @@ def _lean(top: Vec, facing: Facing, ankles: Mapping[Side, Vec], body: Skeleton, 
 def _near(hips: Vec, centres: Sequence[Vec], reach: float) -> Vec:
     # The nearest point of the intersection of balls with one radius round each centre: on a ball's surface, or else on
     # the circle where two meet, or else, where they do not, in the middle.
-    if all(norm(sub(hips, centre)) <= reach for centre in centres):
+    beyond = [centre for centre in centres if norm(sub(hips, centre)) > reach]
+    if not beyond:
         return hips
-    for centre in centres:
+    for centre in beyond:
         pulled = along(centre, unit(sub(hips, centre), (0.0, 1.0, 0.0)), reach)
         if all(norm(sub(pulled, other)) <= reach for other in centres if other is not centre):
             return pulled

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from foottrack_service import rotations as rot
@@ -69,6 +69,8 @@ def test_hips_pitch_forwards_with_the_trunk_and_keep_their_joints_level() -> Non
     assert np.allclose(across, BODY.hip_width * np.array(Facing.of(0.7).right))
 
 
+# Within one leg's reach and beyond the other's.
+@example((0.5, 0.0, 0.0), (-0.09, 0.0, 0.0), (1.5 + 0.09, 0.0, 0.0))
 @given(st.tuples(coordinate, coordinate, coordinate), *[st.tuples(coordinate, coordinate, coordinate)] * 2)
 def test_reach_never_exceeds_the_legs_and_the_hips_move_no_further_than_needed(hips, left, right) -> None:
     ankles = {"left": left, "right": right}
