@@ -41,6 +41,7 @@ lint: setup
 
 # Two kinds of tests at once: those that wait (integration, clients) and those that compute.
 test: lint
+	$(BIN)/foottrack compile
 	$(BIN)/pytest -n auto --dist loadgroup $(ARGS)
 
 # What cannot be installed here is no failure: its tests are skipped, and say so.

@@ -44,6 +44,7 @@ app = typer.Typer(
 app.command()(demo.demo)
 app.command()(service.run)
 app.command()(service.node)
+app.command("compile")(service.compile_kernels)
 app.command()(sim.sim)
 app.command()(recordings.record)
 app.command()(recordings.replay)

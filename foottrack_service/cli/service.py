@@ -52,6 +52,20 @@ def node(
         typer.echo("Stopped.", err=True)
 
 
+def compile_kernels() -> None:
+    """Compile now what the first start on this machine would wait for, in an image or before tests, for instance.
+
+    Example: foottrack compile
+    """
+    from foottrack_service.camera import marker_tracker
+    from foottrack_service.fusion import foot_filter
+
+    foot_filter.warm_up()
+    marker_tracker.say_what_takes_long()
+    marker_tracker.warm_up()
+    typer.echo("All is compiled.", err=True)
+
+
 async def _serve(settings: Settings) -> None:
     from foottrack_service.app import NODES, Service
 

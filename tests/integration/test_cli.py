@@ -205,6 +205,12 @@ def test_nothing_heavy_is_loaded_before_a_command_needs_it() -> None:
     assert not {"scipy", "numba", "cv2", "matplotlib", "foottrack_service.app"}.intersection(loaded)
 
 
+def test_what_the_first_start_would_wait_for_can_be_compiled_before(tmp_path: Path) -> None:
+    done = foottrack("compile", cwd=tmp_path)
+    assert (done.stdout, done.stderr) == ("", "All is compiled.\n")
+    assert "compile" in foottrack("--help", cwd=tmp_path).stdout
+
+
 def test_libraries_talk_only_to_warn(tmp_path: Path) -> None:
     done = foottrack("markers", cwd=tmp_path)
     assert done.stderr == ""
