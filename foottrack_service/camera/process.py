@@ -39,8 +39,6 @@ DARK_GREY = 25.0
 PREVIEW_PERIOD_S = 0.2
 TALLY_PERIOD_S = 0.5
 _JUDGE_EVERY = 60
-_NICENESS = 10
-_BELOW_NORMAL_PRIORITY_CLASS = 0x4000
 
 
 @dataclass(frozen=True)
@@ -221,16 +219,10 @@ def _watch(connection: Connection, settings: Settings, source: Source, speaker: 
 
 
 def _yield_to_others() -> None:
-    """A picture may wait, an IMU's sample may not: where cores are few, fusion goes first."""
-    if sys.platform == "win32":
-        import ctypes
+    """A picture may wait, an IMU's sample may not: when a picture comes, whoever runs goes on (half as long a wait).
 
-        kernel = ctypes.windll.kernel32
-        kernel.GetCurrentProcess.restype = ctypes.c_void_p
-        kernel.SetPriorityClass(ctypes.c_void_p(kernel.GetCurrentProcess()), _BELOW_NORMAL_PRIORITY_CLASS)
-        return
-    os.nice(_NICENESS)
+    No lower priority than others: beside a game that takes all cores the tags would be lost.
+    """
     if sys.platform == "linux":
-        # When a picture comes, whoever runs goes on: niceness alone (10, as 0) kept fusion waiting twice as long.
         with suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
