@@ -65,11 +65,15 @@ class Foot:
     def beside(self, other: Foot) -> None:
         """The person has another foot."""
         self._other = other
-        self._filter.beside(other.target)
+        self._filter.beside(other.target, other.moves)
 
     def target(self, kind: Kind, t: int) -> Target | None:
         """Where fixes of ``kind`` are expected at ``t``, ns; None while that is not well known."""
         return self._filter.target(kind, t)
+
+    def moves(self, frm: int, to: int) -> bool | None:
+        """Whether the IMU shows the foot swinging, or standing, between two instants, ns; None: neither."""
+        return self._filter.moves(frm, to)
 
     @property
     def health(self) -> FilterHealth:
@@ -163,7 +167,7 @@ class Foot:
             self.reject("not_finite")
             self._filter = self._make(self._settings, self._side)
             if self._other is not None:
-                self._filter.beside(self._other.target)
+                self._filter.beside(self._other.target, self._other.moves)
             return None
         return found
 

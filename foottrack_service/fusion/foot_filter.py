@@ -22,6 +22,7 @@ from foottrack_service.fusion.interface import (
     HeadSample,
     ImuSample,
     Kind,
+    Moves,
     OpticalFix,
     Target,
     Verdict,
@@ -110,9 +111,14 @@ class ErrorStateFilter:
         """The headset does not know where it is: what stood need not be where it was in the stage."""
         self._inertial.doubt.forget()
 
-    def beside(self, other: Whereabouts) -> None:
-        """Two feet are never in one place."""
+    def beside(self, other: Whereabouts, moves: Moves) -> None:
+        """Two feet are never in one place, and seldom move alike."""
         self._inertial.other = self._pictures.other = other
+        self._inertial.other_moves = moves
+
+    def moves(self, frm: int, to: int) -> bool | None:
+        """Whether the IMU shows the foot swinging, or standing, between two instants, ns; None: neither."""
+        return self._inertial.moves(frm, to)
 
     def target(self, kind: Kind, t: int) -> Target | None:
         """Where fixes of ``kind`` are expected at ``t``, ns; None while that is not well known."""

@@ -33,6 +33,8 @@ class Rejected:
     residual: Array
     turn: float | None
     """Yaw by which the tag's attitude differs from ours, rad."""
+    yaw_sigma: float
+    """How well we know it, rad."""
     sigma: float
     arm: Array
 

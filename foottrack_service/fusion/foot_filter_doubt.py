@@ -15,6 +15,7 @@ import numpy as np
 from foottrack_service import rotations as rot
 from foottrack_service.fusion.foot_filter_candidates import Candidates, Rejected
 from foottrack_service.fusion.interface import Kind, Target
+from foottrack_service.fusion.whose_motion import WhoseMotion
 from foottrack_service.rotations import Array
 
 FAR = 0.12
@@ -31,6 +32,10 @@ TAKEN = 0.08
 """m, and three sigma of the other foot: two shoes' tags are never so near to each other."""
 FURTHEST_TAKEN, NEARER = 0.25, 0.6
 """m, and share of the way to our own place: a foot that walks unseen drifts, and its tag may be so far off it."""
+OTHER_WAY, OTHER_WAY_S = 0.5, 1.0
+"""rad, beyond three sigma: a tag that points so much elsewhere is the other foot's in a turn, or insists."""
+AT_OURS = 0.4
+"""Share of the way from the other's place: what is nearer to ours may be ours, however it moved."""
 NOT_OURS = 0.05
 """m: a fix that is nearer to where we expect it is looked at no further."""
 SURE_AGE_S = 0.9
@@ -43,6 +48,7 @@ class Doubt:
     """One foot's evidence. Instants in ns; ``unrest`` is the IMU's running total of seconds in which it moved."""
 
     def __init__(self) -> None:
+        self.whose = WhoseMotion()
         self._known_s = 0.0
         """For so long accepted fixes have shown the foot where it is held to be."""
         self._accepted: int | None = None
@@ -74,10 +80,12 @@ class Doubt:
         """Nobody knows where the foot is, or where the stage is."""
         self._known_s, self._accepted, self._taken_since = 0.0, None, None
         self._rested_at, self._before = -math.inf, None
+        self.whose.clear()
         self.clear()
 
     def moved(self, p: Array, q: Array) -> None:
         """The stage moved, old to new."""
+        self.whose.clear()
         self.clear()
         if self._before is not None:
             self._before = (p + rot.rotate(q, self._before[0]), self._before[1])
@@ -87,7 +95,9 @@ class Doubt:
 
         ``sigma``: m per axis, how well the foot knows its place; None when it does not.
         """
-        insist_s = None if sigma is None else self._insist_s(rejected, unrest)
+        insist_s = None if sigma is None or self.whose.is_ours else self._insist_s(rejected, unrest)
+        if insist_s == 0.0 and rejected.turn is not None and abs(rejected.turn) > OTHER_WAY + 3.0 * rejected.yaw_sigma:
+            insist_s = OTHER_WAY_S
         sure_for = None if insist_s is None or sigma is None else self._sure_for(sigma, rejected.t, kind)
         found = self._candidates[kind].add(rejected, sure_for, insist_s or 0.0)
         if found is not None:
@@ -95,15 +105,20 @@ class Doubt:
             self._known_s, self._accepted, self._taken_since = 0.0, rejected.t, None
             self._rested_at = unrest
             self._fix_t[kind] = found[-1].t
+            self.whose.clear()
         return found
 
     def is_others(self, t: int, point: Array, residual: Array, unrest: float, other: Target | None) -> bool:
-        """Whether a fix shows the other foot's target, which is known to be at ``other``."""
-        if other is None or self._was_here(point, 0.0, unrest):
+        """Whether a fix shows the other foot's target, which is known to be at ``other``, or moves as that one does."""
+        if other is None or self.whose.is_ours or self._was_here(point, 0.0, unrest):
             return False
-        gap = float(np.linalg.norm(point - other.p))
-        reach = min(TAKEN + 3.0 * other.sigma, FURTHEST_TAKEN)
-        if gap > reach or gap > NEARER * float(np.linalg.norm(residual)):
+        gap, off = float(np.linalg.norm(point - other.p)), float(np.linalg.norm(residual))
+        if self.whose.is_others and off > AT_OURS * gap:
+            # However long they insist.
+            self._taken_since = None
+            self.clear()
+            return True
+        if gap > min(TAKEN + 3.0 * other.sigma, FURTHEST_TAKEN) or gap > NEARER * off:
             return False
         if self._taken_since is None or t < self._taken_since:
             self._taken_since = t

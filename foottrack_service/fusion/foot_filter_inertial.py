@@ -44,8 +44,9 @@ from foottrack_service.fusion.foot_filter_optical import (
 from foottrack_service.fusion.foot_filter_output import CONTACT, predicted
 from foottrack_service.fusion.foot_filter_replay import attitude_error
 from foottrack_service.fusion.foot_filter_sample import FIRST, JUMPED, LEFT_OUT, first_state, take_sample, upright
-from foottrack_service.fusion.interface import ImuSample, Kind, OpticalFix, Verdict, Whereabouts
+from foottrack_service.fusion.interface import ImuSample, Kind, Moves, OpticalFix, Verdict, Whereabouts
 from foottrack_service.fusion.timeline import Timeline
+from foottrack_service.fusion.whose_motion import moves
 from foottrack_service.rotations import Array
 
 FEET_APART = {"left": -0.1, "right": 0.1}
@@ -76,7 +77,8 @@ class InertialFilter:
         self._blob = Blob(foot)
         self.doubt = Doubt()
         self.other: Whereabouts = lambda kind, t: None
-        """The other foot's ``target``."""
+        """The other foot's ``target``, and its ``moves``."""
+        self.other_moves: Moves = lambda frm, to: None
         self.set_floor(0.0)
         self.place(foot.imu)
 
@@ -137,6 +139,10 @@ class InertialFilter:
             self._accepted(fix.kind)
             return Verdict.ACCEPTED
         return Verdict.UNUSED if taken == UNUSED else Verdict.STALE if taken == STALE else self._doubted(fix, taken)
+
+    def moves(self, frm: int, to: int) -> bool | None:
+        """Whether the foot swings, or stands, between two instants, ns (whose_motion)."""
+        return moves(self._timeline, frm, to)
 
     def learn_blob(self, fix: OpticalFix) -> None:
         """A depth blob that is not needed, since the tag is seen, shows where on the shoe blobs lie."""
@@ -252,9 +258,10 @@ class InertialFilter:
         timeline, i, unrest = self._timeline, int(self._foot["fix_at"][0]), float(self._stance[UNREST])
         t, row, off = int(timeline.t[i]), timeline.rows[i], self._foot["residual"][0].copy()
         point, arm = row[POINT : POINT + 3].copy(), row[ARM : ARM + 3].copy()
+        sigma = math.sqrt(max(row[POINT_COV], row[POINT_COV + 4], row[POINT_COV + 8]))
         if float(off @ off) > NOT_OURS**2:
-            other = self.other(fix.kind, fix.t)
-            if self.doubt.is_others(t, point, off, unrest, other):
+            self.doubt.whose.see(fix.t, fix.kind, point, sigma, self.moves, self.other_moves)
+            if self.doubt.is_others(t, point, off, unrest, self.other(fix.kind, fix.t)):
                 settle_fix(self._foot, i, False)
                 return Verdict.IDENTITY
         if taken == FAR:
@@ -266,8 +273,7 @@ class InertialFilter:
             turn = None
             if row[TURN_SIGMA] > 0.0:
                 turn = float(attitude_error(tuple(row[MEASURED_Q : MEASURED_Q + 4].tolist()), timeline.X[i])[1])
-            sigma = math.sqrt(max(row[POINT_COV], row[POINT_COV + 4], row[POINT_COV + 8]))
-            rejected = Rejected(t, point, off, turn, sigma, arm)
+            rejected = Rejected(t, point, off, turn, math.sqrt(timeline.P[i, 7, 7]), sigma, arm)
             known = math.sqrt(max(timeline.P[i].diagonal()[:3])) if acquired else None
             agreed = self.doubt.agreed(rejected, fix.kind, known, unrest)
             if agreed is not None:

@@ -119,6 +119,9 @@ class Target(NamedTuple):
 Whereabouts = Callable[[Kind, int], Target | None]
 """A foot's ``FootFilter.target``."""
 
+Moves = Callable[[int, int], bool | None]
+"""A foot's ``FootFilter.moves``."""
+
 
 class FootFilter(Protocol):
     """One foot's filter."""
@@ -151,8 +154,11 @@ class FootFilter(Protocol):
     def on_head_lost(self) -> None:
         """The headset does not know where it is: when it does again, the stage may lie elsewhere."""
 
-    def beside(self, other: Whereabouts) -> None:
+    def beside(self, other: Whereabouts, moves: Moves) -> None:
         """There is another foot, and what it knows of itself tells whose a fix is."""
+
+    def moves(self, frm: int, to: int) -> bool | None:
+        """Whether the IMU shows the foot swinging, or standing, between two instants, ns; None: neither."""
 
     def target(self, kind: Kind, t: int) -> Target | None:
         """Where fixes of ``kind`` are expected at ``t``, ns; None while that is not well known."""

@@ -99,7 +99,9 @@ class PicturesOnlyFilter:
         if off > NOT_OURS**2 and self._doubt.is_others(fix.t, z, residual, 0.0, self.other(fix.kind, fix.t)):
             return Verdict.IDENTITY
         if off > min(CHI_SQUARE_3 * (P[0, 0] + variance), FURTHEST_AT_ONCE**2):
-            rejected = Rejected(fix.t, z, z if self.newest is None else residual, None, math.sqrt(variance), self._arm)
+            rejected = Rejected(
+                fix.t, z, z if self.newest is None else residual, None, 0.0, math.sqrt(variance), self._arm
+            )
             agreed = self._doubt.agreed(rejected, fix.kind, None, 0.0)
             if agreed is None:
                 return Verdict.UNCONFIRMED if self.newest is None else Verdict.GATE

@@ -24,7 +24,16 @@ from foottrack_protocol.messages import Side
 from foottrack_service import rotations as rot
 from foottrack_service.config import FootSettings, Placement
 from foottrack_service.fusion.attitude import Attitude
-from foottrack_service.fusion.interface import FootEstimate, ImuSample, Kind, OpticalFix, Target, Verdict, Whereabouts
+from foottrack_service.fusion.interface import (
+    FootEstimate,
+    ImuSample,
+    Kind,
+    Moves,
+    OpticalFix,
+    Target,
+    Verdict,
+    Whereabouts,
+)
 from foottrack_service.fusion.ladder import BALL_68_OF_ONE_AXIS, Ladder
 from foottrack_service.rotations import Array
 
@@ -214,8 +223,12 @@ class ReferenceFilter:
     def on_head_lost(self) -> None:
         """Makes no difference here."""
 
-    def beside(self, other: Whereabouts) -> None:
+    def beside(self, other: Whereabouts, moves: Moves) -> None:
         """Nothing is gated here: whoever is called left is the left foot."""
+
+    def moves(self, frm: int, to: int) -> bool | None:
+        """Nobody asks."""
+        return None
 
     def target(self, kind: Kind, t: int) -> Target | None:
         """Never well known."""

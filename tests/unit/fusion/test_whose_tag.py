@@ -105,6 +105,15 @@ def test_feet_that_stood_are_at_once_back_where_they_were_after_they_were_swappe
         assert is_back(t, error, FROM + 10.0)
 
 
+@pytest.mark.parametrize("task", ["steps", "walk-in-place", "walk"])
+def test_feet_that_move_are_not_taken_to_each_other_however_long_they_are_swapped(task: str) -> None:
+    """A tag that lies while its foot swings is not believed; without tags a foot drifts."""
+    run = scenario(task, 16.0)
+    for t, error in errors(swapped(run.messages(), FROM + 10.0), run).values():
+        assert error[(t >= FROM) & (t < FROM + 10.0)].max() < 0.25
+        assert error[(t >= FROM + 10.5) & (t < FROM + 10.8)].max() < 0.03
+
+
 def test_feet_that_began_with_each_other_s_tags_find_their_own() -> None:
     run = scenario("head-moving", 9.0)
     for t, error in errors(swapped(run.messages(), 2.0, frm=0.0), run).values():
