@@ -13,7 +13,7 @@ import math
 
 from foottrack_service.compiled import compiled
 from foottrack_service.fusion.compiled_rotations import Vector, quaternion, rotation, squared, turned
-from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE, ROLL, Stamps
+from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE, REST_RATE, REST_S, ROLL, Stamps
 from foottrack_service.fusion.foot_filter_kernel import GRAVITY
 from foottrack_service.fusion.foot_filter_memory import SEEN_KEPT, Foot
 from foottrack_service.rotations import Array
@@ -41,6 +41,14 @@ PUSH, PUSH_SHARE = 0.5, 0.3
 DOUBT_S = 1.0
 """A push that lasts for longer, in silence, is no push but a wrong tilt."""
 
+QUIET_STATISTIC = 0.25
+"""A foot this quiet may show its gyro's bias ..."""
+REST_BLOCK_S, FIRST_BLOCK_S = 0.5, 0.1
+"""... by its mean over so long, once it has been as quiet for as long again: weight is shifted half a second before a
+step is seen, and turns the foot by degrees. Who does not know the bias yet takes what each stance offers."""
+BIAS_KNOWN = 0.0005
+"""rad/s per axis."""
+
 SEEN_SPAN_NS = 250_000_000
 SEEN_LEAST = 6
 SEEN_NOISE = 0.04
@@ -49,6 +57,10 @@ SEEN_NOISE = 0.04
 # memory, shape (4,): the swing's peak that fades, the newest sample's statistic, how long it was pushed, and for how
 # many seconds in all it did not stand
 PEAK, STATISTIC, DOUBTED, UNREST = 0, 1, 2, 3
+
+# rest, shape (8,): for how long the foot has rested, s, and its turn meanwhile, rad; the same of the block before that,
+# but as a mean rate, rad/s
+NOW, BEFORE = 0, 4
 
 
 @compiled
@@ -118,9 +130,37 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
         if memory[DOUBTED] < DOUBT_S:
             return 0.0
     memory[UNREST] -= dt
+    if rows[i, MEAN_RATE] == 1.0:
+        # A device's corrections of its own tilt look like rolling: believed, they cost more than rolling does.
+        return STILL_SIGMA + SIGMA_GROWTH * statistic
     rows[i, ROLL], rows[i, ROLL + 1], rows[i, ROLL + 2] = rate
     turning = math.sqrt(squared(rate[0] - x[13]) + squared(rate[1] - x[14]) + squared(rate[2] - x[15]))
     return STILL_SIGMA + SIGMA_GROWTH * statistic + LEVER * turning
+
+
+@compiled
+def rest(s: Foot, row: Array, P: Array, dt: float) -> None:
+    """Write into the newest row how a foot that rests turned a while ago.
+
+    ``P`` the filter's before it; ``dt``, s, since the last sample; 0 when it does not rest.
+    """
+    memory = s.rest[:]
+    if not 0.0 < dt < REST_BLOCK_S or s.stance[STATISTIC] >= QUIET_STATISTIC or row[MEAN_RATE] == 1.0:
+        memory[:] = 0.0
+        return
+    memory[NOW] += dt
+    for k in range(3):
+        memory[NOW + 1 + k] += row[GYRO + k] * dt
+    known = max(P[12, 12], P[13, 13], P[14, 14]) < BIAS_KNOWN**2
+    if memory[NOW] < (REST_BLOCK_S if known else FIRST_BLOCK_S):
+        return
+    row[REST_S] = memory[BEFORE]
+    for k in range(3):
+        row[REST_RATE + k] = memory[BEFORE + 1 + k]
+        memory[BEFORE + 1 + k] = memory[NOW + 1 + k] / memory[NOW]
+        memory[NOW + 1 + k] = 0.0
+    memory[BEFORE] = memory[NOW]
+    memory[NOW] = 0.0
 
 
 @compiled

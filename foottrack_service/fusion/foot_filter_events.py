@@ -22,8 +22,8 @@ GYRO = 4
 CLIPPED = 7
 ZERO_SIGMA = 8
 """m/s per 10 ms; 0 while the foot swings."""
-QUIET_FLAG = 9
-"""1 when the foot is so quiet that the gyro shows its bias."""
+REST_S = 9
+"""s: the gyro showed its bias for so long, and now counts; else 0."""
 UP = 10
 """The device's own idea of up, unit, 3 columns; zeros without one."""
 FLOOR = 13
@@ -35,6 +35,8 @@ WANDER = 15
 """rad/sqrt(s): by how much GYRO's tilt wanders beyond a gyro's noise."""
 ROLL = 16
 """rad/s, 3 columns: how a foot that stands turns."""
+REST_RATE = 19
+"""rad/s, 3 columns: its mean rate over REST_S."""
 
 # An optical fix, stage.
 POINT = 1

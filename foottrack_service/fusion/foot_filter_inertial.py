@@ -312,6 +312,7 @@ class InertialFilter:
         self._timeline.P[0, range(3), range(3)] += 0.1**2
         self._timeline.P[0, range(3, 6), range(3, 6)] += 1.0
         self._stance[:] = 0.0
+        self._foot["rest"] = 0.0
         self.acquired = False
         self.doubt.clear()
         self._forget_motion()

@@ -47,8 +47,8 @@ GYRO_SCALE = 0.0005
 """1/sqrt(Hz), per rad/s: scale factor and misalignment."""
 ACC_BIAS_WALK = 0.0005
 """m/s^2/sqrt(s)."""
-GYRO_BIAS_WALK = 0.00002
-"""rad/s/sqrt(s)."""
+GYRO_BIAS_WALK = 0.0001
+"""rad/s/sqrt(s): a real one drifts by 0.04 deg/s while its sensor warms up for 10 s."""
 DELAY_WALK = 0.0001
 """s/sqrt(s)."""
 SMALLEST, SMALLEST_OF_GYRO_BIAS = 1e-8, 1e-14

@@ -40,8 +40,9 @@ from foottrack_service.fusion.foot_filter_events import (
     POINT,
     POINT_COV,
     POINT_SIGMA,
-    QUIET_FLAG,
     RESET,
+    REST_RATE,
+    REST_S,
     ROLL,
     SPEED,
     SPEED_SIGMA,
@@ -87,6 +88,8 @@ FLOOR_LEAN = 0.9
 """Cosine: a foot that leans more stands on its heel or toes, and the ankle's height says nothing."""
 BIAS_SIGMA = 0.01
 """rad/s per 10 ms: how little a quiet foot turns."""
+BIAS_GATE = 100.0
+"""Chi-square: what turns much faster than its gyro can be off by does not rest."""
 UP_SIGMA = 0.04
 """rad: the device's own tilt."""
 UP_CORRELATED_S = 2.0
@@ -262,11 +265,11 @@ def _inertial_updates(s: Foot, row: Array, x: Array, P: Array, dt: float) -> Non
                     h[:] = 0.0
                     h[1], h[6], h[8] = 1.0, -r[2], r[0]
                     update1(x, P, h, off, squared(FLOOR_SIGMA + sigma) * 0.1 / dt, np.inf)
-        if row[QUIET_FLAG] == 1.0 and row[MEAN_RATE] == 0.0:
+        if row[REST_S] > 0.0:
             for k in range(3):
                 h[:] = 0.0
                 h[12 + k] = 1.0
-                update1(x, P, h, row[GYRO + k] - x[13 + k], BIAS_SIGMA**2 * 0.01 / dt, 9.0)
+                update1(x, P, h, row[REST_RATE + k] - x[13 + k], BIAS_SIGMA**2 * 0.01 / row[REST_S], BIAS_GATE)
         if max(P[6, 6], P[8, 8]) > LEVEL_BELOW**2:
             up = (row[ACC] / GRAVITY, row[ACC + 1] / GRAVITY, row[ACC + 2] / GRAVITY)
             _level(up, LEVEL_SIGMA**2 * 0.1 / dt, x, P)

@@ -9,7 +9,7 @@ import numpy as np
 from foottrack_service import rotations as rot
 from foottrack_service.compiled import compiled
 from foottrack_service.fusion.compiled_rotations import conjugate, logarithm, product, quaternion, rotation, squared
-from foottrack_service.fusion.contact import STATISTIC, stance_sigma
+from foottrack_service.fusion.contact import rest, stance_sigma
 from foottrack_service.fusion.foot_filter_events import (
     ACC,
     CLIPPED,
@@ -19,7 +19,6 @@ from foottrack_service.fusion.foot_filter_events import (
     IMU,
     KIND,
     MEAN_RATE,
-    QUIET_FLAG,
     UP,
     WANDER,
     ZERO_SIGMA,
@@ -38,8 +37,6 @@ JUMPED_AFTER = 4
 """So many samples in a row from the past: the device's clock was set back."""
 UNSURE_AFTER_S = 0.25
 """A hole in the IMU after which the place needs fixes that agree."""
-QUIET_STATISTIC = 0.25
-"""A foot this quiet shows its gyro's bias."""
 MOST_RATE = 40.0
 """rad/s: increments of a device's q that are faster are its own corrections, not the foot."""
 FULL_SCALES = (39.2266, 78.4532, 156.9064)
@@ -92,7 +89,7 @@ def take_sample(foot: Feet, t: int, has_gyro: bool, has_q: bool) -> int:
         sigma = stance_sigma(s.t[:], s.rows[:], i, dt, s.X[i - 1], s.P[i - 1], s.stance[:])
         if sigma > 0.0:
             row[ZERO_SIGMA] = math.sqrt(sigma * sigma + s.seen_speed * s.seen_speed)
-            row[QUIET_FLAG] = 1.0 if s.stance[STATISTIC] < QUIET_STATISTIC and s.seen_speed == 0.0 else 0.0
+        rest(s, row, s.P[i - 1], dt if sigma > 0.0 and s.seen_speed == 0.0 else 0.0)
         row[FLOOR] = s.floor
         replay(s, i, s.n)
     for k in range(COLUMNS):

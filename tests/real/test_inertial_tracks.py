@@ -19,9 +19,9 @@ def test_walks_and_runs_against_motion_capture() -> None:
     assert max(errors) < 0.5
 
 
-@pytest.mark.parametrize(("walk", "plane"), [("short_walk", 0.06), ("long_walk", 0.2)])
+@pytest.mark.parametrize(("walk", "plane"), [("short_walk", 0.05), ("long_walk", 0.13)])
 def test_walks_end_where_they_began(walk: str, plane: float) -> None:
-    # The gyro's own heading explains what is left of the long one: 0.45 % of a full turn.
+    # A gyro's bias of 0.03 deg/s explains what is left of the long one: 12 s of standing show it no better.
     in_plane, height = xio_end_error(walk)
     assert in_plane < plane
     assert abs(height) < 0.01
