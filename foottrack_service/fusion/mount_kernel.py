@@ -9,8 +9,9 @@ from foottrack_service.fusion.compiled_rotations import quaternion, rotation, tu
 from foottrack_service.fusion.foot_filter_kernel import invert3
 from foottrack_service.rotations import Array
 
-POINT, VALUE, COLUMNS = 7, 10, 11
-"""Columns of a stance's sums: the 7 unknowns, its own point (3) from POINT on, the measured value."""
+SCALE, POINT, VALUE, COLUMNS = 6, 7, 10, 11
+"""Columns of a stance's sums: the 7 unknowns, the depth's scale last of them, its own point (3) from POINT on, the
+measured value."""
 
 
 @compiled
@@ -31,7 +32,7 @@ def collect(
         a, b, c = R[i]
         A[i, 0], A[i, 1], A[i, 2] = b * p[2] - c * p[1], c * p[0] - a * p[2], a * p[1] - b * p[0]
         A[i, 3], A[i, 4], A[i, 5] = -a, -b, -c
-        A[i, 6] = -seen[i]
+        A[i, SCALE] = -seen[i]
         A[i, POINT + i] = 1.0
         A[i, VALUE] = head_p[i] + seen[i]
         for j in range(3):
@@ -49,6 +50,10 @@ def collect(
                 share = weight * (A[0, i] * W[0][k] + A[1, i] * W[1][k] + A[2, i] * W[2][k])
                 for j in range(COLUMNS):
                     sums[i, j] += share * A[k, j]
+        # A target's noise is in the column of the scale too, with the other sign: left in, it passes for scale.
+        shared = weight * (3.0 - noise * (W[0][0] + W[1][1] + W[2][2]))
+        sums[SCALE, VALUE] += shared
+        sums[VALUE, SCALE] += shared
     return distance
 
 

@@ -9,6 +9,7 @@ from foottrack_protocol.messages import MountValues
 from foottrack_service import rotations as rot
 from foottrack_service.fusion.interface import HeadSample, OpticalFix
 from foottrack_service.fusion.mount_calibration import MountCalibrator
+from foottrack_service.fusion.mount_kernel import COLUMNS, POINT, SCALE, VALUE, collect
 from foottrack_service.rotations import Array
 
 TURN = rot.from_rotation_vector(np.deg2rad([1.0, -0.5, 0.6]))
@@ -98,6 +99,20 @@ def test_a_foot_that_moves_says_nothing_of_the_mount() -> None:
     assert before is not None and after is not None
     assert calibrator.slips == 0
     assert np.rad2deg(rot.angle_between(before.q, after.q)) < 0.1
+
+
+def test_noise_passes_for_no_scale_of_the_depth() -> None:
+    """A picture's noise is in what is measured and in what the scale multiplies: uncorrected, 6 mm were 2.9 % here."""
+    sums = np.zeros((COLUMNS, COLUMNS))
+    random = np.random.default_rng(5)
+    for t in np.arange(0.0, 100.0, 1 / 30):
+        head_p = np.array([0.05 * np.sin(0.5 * t), 1.6 + 0.05 * np.sin(1.1 * t), 0.05 * np.cos(0.7 * t)])
+        p = np.array([0.1, 0.05, -0.2]) - head_p + 0.006 * random.normal(size=3)
+        collect(sums, np.zeros(7), head_p, rot.IDENTITY, p, 36e-6 * np.eye(3), 1e-6, 1.0)
+    kept = [SCALE, *range(POINT, VALUE)]
+    found = np.linalg.solve(sums[np.ix_(kept, kept)], sums[kept, VALUE])
+    assert abs(found[0]) < 0.004
+    assert np.allclose(found[1:], [0.1, 0.05, -0.2], atol=0.005)
 
 
 @pytest.mark.parametrize("broken", [np.nan, np.inf])
