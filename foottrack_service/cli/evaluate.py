@@ -17,6 +17,8 @@ from foottrack_service.cli.running import EXIT_USAGE, CommandFailed, JsonOption,
 
 _WIDTH = 140
 _FIGURES = ("mean", "median", "p95", "max")
+_SIGMA_DUE = "sigma is the radius of the ball of 68 %: 68.3, 99.7 and 100.0 % are due within 1, 2 and 3 of it"
+"""Of an isotropic normal error: chi-square with 3 degrees of freedom at 3.5267 times 1, 4 and 9."""
 _REAL_TITLES = {
     "tracks": "Real walks and runs against motion capture, rms on the floor, m",
     "returns": "Real walks that end where they began: where they end, mm",
@@ -206,7 +208,7 @@ def _as_tables(results: dict[str, Any]) -> list[Table]:
 
 
 def _task_table(title: str, rows: dict[str, Any]) -> Table:
-    table = Table(title=title, title_justify="left")
+    table = Table(title=title, title_justify="left", caption=_SIGMA_DUE, caption_justify="left")
     for name in ("task", "filter"):
         table.add_column(name, no_wrap=True)
     for name in (*_FIGURES, "lag", "jitter", "skate", "in 1, 2, 3 sigma"):
