@@ -35,8 +35,6 @@ ACC_NOISE = 0.01
 below, a swing's velocity was five times surer than it said, and blobs and false tags had their way.)"""
 ACC_SCALE = 0.002
 """1/sqrt(Hz): what a moving foot adds per m/s^2 that is felt beyond gravity (scale factor, soft mounting)."""
-FUSED_ACC = 2.0
-"""Both are as much larger where the attitude is a device's own, which errs with what it feels."""
 ACC_STEP = 0.02
 """1/sqrt(Hz): per m/s^2 that two neighbouring samples differ by: what happened between them is a guess."""
 ACC_CLIPPED = 2.0
@@ -87,8 +85,7 @@ def propagate(
 
     felt = math.sqrt(ax * ax + ay * ay + az * az)
     rate = math.sqrt(wx * wx + wy * wy + wz * wz)
-    sigma_a = (ACC_NOISE + ACC_SCALE * felt) * (FUSED_ACC if wander > 0.0 else 1.0)
-    sigma_a += ACC_STEP * step + (ACC_CLIPPED if clipped else 0.0)
+    sigma_a = ACC_NOISE + ACC_SCALE * felt + ACC_STEP * step + (ACC_CLIPPED if clipped else 0.0)
     sigma_w = GYRO_NOISE + GYRO_SCALE * rate
     sigma_yaw = sigma_w
     sigma_w += wander

@@ -47,8 +47,8 @@ anything it has ever given. (Coarse or smooth samples repeat by chance, some eve
 velocity 0.14 m/s of its certainty.)"""
 LEAST_FORCE = 1.0
 """m/s^2: a sensor in free fall does not know where up is."""
-DEVICE_TILT = 0.02
-"""rad/sqrt(s) by which the tilt of a device's own q wanders while it moves: 1.1 deg that change within 2 s."""
+DEVICE_TILT = 0.03
+"""rad/sqrt(s) by which the tilt of a device's own q wanders while it moves: 1.7 deg that change within 2 s."""
 FULL_EFFORT = 3.0
 """m/s^2 beyond gravity at which all of that is there."""
 EFFORT_MEMORY_S = 2.0
