@@ -23,6 +23,9 @@ _HIP_BACK = 0.05
 EYES_ABOVE_NECK = 0.10
 EYES_BEFORE_NECK = 0.085
 
+BALL_SHARE = 0.65
+"""Of the way from ankle to the toes' tip: there are the metatarsal heads, over which a foot rolls and its toes bend."""
+
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:

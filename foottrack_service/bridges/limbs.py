@@ -9,6 +9,7 @@ import numpy as np
 
 from foottrack_protocol.messages import FootPose, Pose
 from foottrack_service.body.legs import knee_axis
+from foottrack_service.body.skeleton import BALL_SHARE
 from foottrack_service.rotations import Array, from_matrix, from_yaw, rotate, yaw_of
 
 _SHORTEST = 1e-6
@@ -27,10 +28,6 @@ class Leg(NamedTuple):
     foot_q: Array
 
 
-TOES_SHARE = 0.65
-"""The toes bend where the metatarsal heads are: at about so much of the way from ankle to the toes' tip."""
-
-
 def leg(hips: Pose | None, foot: FootPose | None) -> Leg | None:
     """None where a joint is not known, or the foot is lost."""
     if hips is None or foot is None or foot.stage == "lost" or foot.hip is None or foot.knee is None:
@@ -43,7 +40,7 @@ def leg(hips: Pose | None, foot: FootPose | None) -> Leg | None:
         hip,
         knee,
         ankle,
-        ankle + TOES_SHARE * (np.asarray(foot.toe) - ankle),
+        ankle + BALL_SHARE * (np.asarray(foot.toe) - ankle),
         _hanging(hip, knee, axis),
         _hanging(knee, ankle, axis),
         np.asarray(foot.ankle.q),

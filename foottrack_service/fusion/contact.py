@@ -140,9 +140,10 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
 
 @compiled
 def rest(s: Foot, row: Array, P: Array, dt: float) -> None:
-    """Write into the newest row how a foot that rests turned a while ago.
+    """Write into the newest ``row`` how a resting foot turned one block ago, whenever a block of rest is full.
 
-    ``P`` the filter's before it; ``dt``, s, since the last sample; 0 when it does not rest.
+    ``P``, shape (16, 16), is the filter's before it; ``dt``, s, since the last sample, or 0 for a foot that swings, or
+    that fixes see moving: its rest begins anew.
     """
     memory = s.rest[:]
     if not 0.0 < dt < REST_BLOCK_S or s.stance[STATISTIC] >= QUIET_STATISTIC or row[MEAN_RATE] == 1.0:

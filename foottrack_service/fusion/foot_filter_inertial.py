@@ -13,6 +13,7 @@ import numpy as np
 
 from foottrack_protocol.messages import Side
 from foottrack_service import rotations as rot
+from foottrack_service.body.skeleton import BALL_SHARE
 from foottrack_service.config import FootSettings, Placement
 from foottrack_service.fusion.contact import QUIET, STATISTIC, UNREST
 from foottrack_service.fusion.foot_filter_candidates import Rejected, fill_reset
@@ -51,8 +52,6 @@ from foottrack_service.rotations import Array
 
 FEET_APART = {"left": -0.1, "right": 0.1}
 """m: where a foot stands that only an IMU knows (PROTOCOL, results)."""
-BALL = 0.65
-"""Share of the way from ankle to toes at which a foot rolls: the metatarsal heads."""
 KNOWN_SIGMA = 0.25
 """m per axis: of a foot that may claim a fix."""
 
@@ -87,7 +86,7 @@ class InertialFilter:
         foot, settings = self._foot, self._settings
         self._imu_p, self._imu_q = np.array(imu.p), rot.normalised(np.array(imu.q))
         foot["ankle_arm"] = rot.unrotate(self._imu_q, -self._imu_p)
-        ball = np.array([1.0, 1.0, BALL]) * settings.toe.p
+        ball = np.array([1.0, 1.0, BALL_SHARE]) * settings.toe.p
         foot["ball_arm"] = rot.unrotate(self._imu_q, ball - self._imu_p)
         foot["foot_up"] = rot.unrotate(self._imu_q, np.array([0.0, 1.0, 0.0]))
         foot["foot_to_sensor"] = rot.conjugate(self._imu_q)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
+from foottrack_service.body.skeleton import BALL_SHARE
 from foottrack_service.gait.samples import FootSample, Shoe
 
 FootEventName = Literal["heel_off", "toe_off", "mid_swing", "terminal_swing", "foot_strike"]
@@ -17,8 +18,6 @@ Phase = Literal["stance", "ascending", "mid_swing", "descending", "terminal_swin
 
 _HEEL_BEHIND = 0.055
 """m: the heel behind the ankle, about a quarter of a foot."""
-_BALL_SHARE = 0.65
-"""Of the way from ankle to toes."""
 _HEEL_RISE = 0.008
 _TOE_RISE = 0.009
 """m: what heel and lowest point have risen by when they are taken to have left."""
@@ -76,7 +75,7 @@ class FootPhases:
     def __init__(self, shoe: Shoe) -> None:
         self._shoe = shoe
         # The forefoot rolls over an arc that leaves the flat sole at the ball and ends at the toes' tip.
-        rise, run = shoe.ankle_height - shoe.toe_below, (1.0 - _BALL_SHARE) * shoe.toe_ahead
+        rise, run = shoe.ankle_height - shoe.toe_below, (1.0 - BALL_SHARE) * shoe.toe_ahead
         self._radius = 0.5 * (rise * rise + run * run) / rise if rise > 0.0 else 0.0
         self._steepest = run / self._radius if rise > 0.0 else 0.0
         """Sine of the pitch from which on the foot stands on the tip; 0 for a sole without toe spring."""
@@ -170,9 +169,9 @@ class FootPhases:
         shoe, radius, steepest = self._shoe, self._radius, self._steepest
         heel = -shoe.ankle_height * up + _HEEL_BEHIND * along
         if 0.0 < along < steepest:
-            front = (radius - shoe.ankle_height) * up - _BALL_SHARE * shoe.toe_ahead * along - radius
+            front = (radius - shoe.ankle_height) * up - BALL_SHARE * shoe.toe_ahead * along - radius
         else:
-            ball = -shoe.ankle_height * up - _BALL_SHARE * shoe.toe_ahead * along
+            ball = -shoe.ankle_height * up - BALL_SHARE * shoe.toe_ahead * along
             front = min(ball, -shoe.toe_below * up - shoe.toe_ahead * along)
         return heel + shoe.ankle_height, min(heel, front) + max(shoe.ankle_height, shoe.toe_below)
 

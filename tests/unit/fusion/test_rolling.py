@@ -8,9 +8,10 @@ import numpy as np
 
 from foottrack_protocol.frames import STANDARD_GRAVITY
 from foottrack_service import rotations as rot
+from foottrack_service.body.skeleton import BALL_SHARE
 from foottrack_service.config import FootSettings
 from foottrack_service.fusion.foot_filter_events import CLIPPED, ZERO_SIGMA
-from foottrack_service.fusion.foot_filter_inertial import BALL, InertialFilter
+from foottrack_service.fusion.foot_filter_inertial import InertialFilter
 from foottrack_service.fusion.interface import ImuSample
 
 STEP_NS = 2_500_000
@@ -27,7 +28,7 @@ def standing(seconds: float) -> InertialFilter:
 def test_a_heel_that_rises_slowly_is_not_held_down() -> None:
     filter_ = standing(2.0)
     settings = FootSettings()
-    ball = np.array([0.0, -settings.ankle_height, BALL * settings.toe.p[2]])
+    ball = np.array([0.0, -settings.ankle_height, BALL_SHARE * settings.toe.p[2]])
     first = filter_.state[0][:3].copy()
     # 0.25 rad/s about the ball after a smooth start of 0.1 s: the ankle rises at 3 cm/s, and all is quiet.
     rate, begins, start = 0.25, filter_.newest, 0.1
