@@ -28,8 +28,8 @@ FOOT = np.dtype(
         ("X", np.float64, (2 * KEPT, NX)),
         ("P", np.float64, (2 * KEPT, NE, NE)),
         # The newest sample: its stamp, its row, its q (zeros without one); the specific force of the last two, and its
-        # largest component ever; how many have come from the past since; how much a device has been moved lately
-        # (foot_filter_sample.py).
+        # largest component, which fades; how many have come from the past since; how much a device has been moved
+        # lately (foot_filter_sample.py).
         ("newest", np.int64),
         ("last", np.float64, COLUMNS),
         ("last_q", np.float64, 4),

@@ -45,6 +45,8 @@ STUCK_ABOVE = 11.0
 """m/s^2: an axis that gives the same bits beyond this three times is at its end, wherever that is: no smaller than
 anything it has ever given. (Coarse or smooth samples repeat by chance, some every second, and each would cost the
 velocity 0.14 m/s of its certainty.)"""
+STRONGEST_S = 600.0
+"""How fast the strongest ever is forgotten: one damaged sample must not hide an accelerometer's end for good."""
 LEAST_FORCE = 1.0
 """m/s^2: a sensor in free fall does not know where up is."""
 DEVICE_TILT = 0.03
@@ -142,6 +144,7 @@ def _fill_sample(s: Foot, row: Array, has_gyro: bool, has_q: bool, dt: float) ->
     """Write the sample, which comes ``dt`` s after the last one, into ``row``."""
     row[KIND] = IMU
     largest, stuck = 0.0, False
+    s.strongest *= math.exp(-max(dt, 0.0) / STRONGEST_S)
     for k in range(3):
         force = s.acc[k]
         row[ACC + k] = force

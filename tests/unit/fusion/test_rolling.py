@@ -64,3 +64,16 @@ def test_a_force_that_repeats_is_clipped_only_at_the_strongest_ever() -> None:
     assert feel(39.0, 1) == 1.0  # 4 g ...
     assert feel(45.0, 1) == 0.0
     assert feel(39.0, 1) == 0.0  # ... is not this one's end
+
+
+def test_one_damaged_sample_does_not_hide_an_accelerometer_s_end_for_good() -> None:
+    filter_ = standing(0.5)
+    force = np.array([0.0, 900.0, 0.0])
+    filter_.on_imu(ImuSample(filter_.newest + STEP_NS, force, np.zeros(3), None))
+    ends, step_ns = [], 20_000_000
+    for _ in range(4):
+        for _ in range(round(600e9 / step_ns)):
+            filter_.on_imu(ImuSample(filter_.newest + step_ns, UP, np.zeros(3), None))
+        filter_.on_imu(ImuSample(filter_.newest + step_ns, np.array([0.0, 78.4, 0.0]), np.zeros(3), None))
+        ends.append(float(filter_.last_row[CLIPPED]))
+    assert ends == [0.0, 0.0, 1.0, 1.0]
