@@ -31,9 +31,9 @@ SHARE_OF_SWING = 0.1
 SWING_MEMORY_S = 2.0
 STILL_SIGMA = 0.005
 """m/s: how still a foot stands at best. Holds per 10 ms: neighbouring samples repeat the same truth."""
-SIGMA_GROWTH = 0.02
+SIGMA_GROWTH = 0.03
 """m/s per unit of the statistic."""
-LEVER = 0.05
+LEVER = 0.075
 """m: so far from the ball may the point be over which a foot rolls that turns while it stands."""
 
 PUSH, PUSH_SHARE = 0.5, 0.3

@@ -41,8 +41,9 @@ ACC_CLIPPED = 2.0
 """m/s^2/sqrt(Hz) while the accelerometer is at its end."""
 GYRO_NOISE = 0.001
 """rad/s/sqrt(Hz)."""
-GYRO_SCALE = 0.0005
-"""1/sqrt(Hz), per rad/s: scale factor and misalignment."""
+GYRO_SCALE, GYRO_TILT_SCALE = 0.0005, 0.002
+"""1/sqrt(Hz), per rad/s: scale factor and misalignment; the second is what it does to the tilt beside that, which the
+next stance shows. (A yaw that is less sure is turned by what passes for zero velocity, and nothing turns it back.)"""
 ACC_BIAS_WALK = 0.0005
 """m/s^2/sqrt(s)."""
 GYRO_BIAS_WALK = 0.0001
@@ -88,7 +89,7 @@ def propagate(
     sigma_a = ACC_NOISE + ACC_SCALE * felt + ACC_STEP * step + (ACC_CLIPPED if clipped else 0.0)
     sigma_w = GYRO_NOISE + GYRO_SCALE * rate
     sigma_yaw = sigma_w
-    sigma_w += wander
+    sigma_w += GYRO_TILT_SCALE * rate + wander
     qa = sigma_a * sigma_a * dt
     for i in range(3):
         P[i, i] += qa * dt * dt / 3.0
@@ -165,12 +166,16 @@ def update3(x: Array, P: Array, H: Array, innovation: Vector, noise: Array, gate
 def update_speed(x: Array, P: Array, speed: Vector, variance: float, gate: float) -> float:
     """The velocity is ``speed``, m/s, stage, with this variance per axis, (m/s)^2; else as ``update3``."""
     PH = P[3:6].copy()
-    S = (
-        (PH[0, 3] + variance, PH[0, 4], PH[0, 5]),
-        (PH[1, 3], PH[1, 4] + variance, PH[1, 5]),
-        (PH[2, 3], PH[2, 4], PH[2, 5] + variance),
-    )
-    return _fuse3(x, P, PH, S, (speed[0] - x[3], speed[1] - x[4], speed[2] - x[5]), gate)
+    return _fuse3(x, P, PH, _speed_covariance(P, variance), _faster(x, speed), gate)
+
+
+@compiled
+def speed_distance(x: Array, P: Array, speed: Vector, variance: float) -> float:
+    """Squared Mahalanobis distance of the velocity from ``speed``, as ``update_speed`` has it; inf without one."""
+    found, inverse = invert3(_speed_covariance(P, variance))
+    off = _faster(x, speed)
+    y = turned(inverse, off)
+    return off[0] * y[0] + off[1] * y[1] + off[2] * y[2] if found else math.inf
 
 
 @compiled
@@ -208,6 +213,20 @@ def floor_covariance(P: Array) -> None:
         smallest = SMALLEST_OF_GYRO_BIAS if 12 <= i < 15 else SMALLEST
         if P[i, i] < smallest:
             P[i, i] = smallest
+
+
+@compiled
+def _speed_covariance(P: Array, variance: float) -> Matrix:
+    return (
+        (P[3, 3] + variance, P[3, 4], P[3, 5]),
+        (P[4, 3], P[4, 4] + variance, P[4, 5]),
+        (P[5, 3], P[5, 4], P[5, 5] + variance),
+    )
+
+
+@compiled
+def _faster(x: Array, speed: Vector) -> Vector:
+    return speed[0] - x[3], speed[1] - x[4], speed[2] - x[5]
 
 
 @compiled

@@ -15,13 +15,13 @@ pytestmark = [
 def test_walks_and_runs_against_motion_capture() -> None:
     errors = [vicon_rmse(file) for file in sorted((DATA / "llio_pyshoe_vicon_dev").glob("*.npz"))]
     assert len(errors) == 9
-    assert np.median(errors) < 0.08
-    assert max(errors) < 0.5
+    assert np.median(errors) < 0.07
+    assert max(errors) < 0.2
 
 
-@pytest.mark.parametrize(("walk", "plane"), [("short_walk", 0.05), ("long_walk", 0.13)])
+@pytest.mark.parametrize(("walk", "plane"), [("short_walk", 0.05), ("long_walk", 0.11)])
 def test_walks_end_where_they_began(walk: str, plane: float) -> None:
-    # A gyro's bias of 0.03 deg/s explains what is left of the long one: 12 s of standing show it no better.
+    # As much as what is left is made by 0.02 deg/s of bias, which 12 s of standing show no better, or 0.2 % of scale.
     in_plane, height = xio_end_error(walk)
     assert in_plane < plane
     assert abs(height) < 0.01

@@ -7,10 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from foottrack_service.config import FootSettings
 from foottrack_service.fusion.contact import PEAK, QUIET, STILL_SIGMA, see, stance_sigma, stillness
-from foottrack_service.fusion.foot_filter_events import ACC, COLUMNS, GYRO, IMU, KIND, MEAN_RATE
+from foottrack_service.fusion.foot_filter_events import ACC, COLUMNS, GYRO, IMU, KIND, MEAN_RATE, ZERO_SIGMA
+from foottrack_service.fusion.foot_filter_inertial import InertialFilter
 from foottrack_service.fusion.foot_filter_kernel import GRAVITY, NE, NX
 from foottrack_service.fusion.foot_filter_memory import SEEN_KEPT, new_foot
+from foottrack_service.fusion.interface import ImuSample
 from foottrack_service.rotations import Array
 
 STEP = 5_000_000
@@ -120,3 +123,23 @@ def test_more_fixes_than_are_kept_show_the_newest_motion() -> None:
         see(foot[0], i * 3_000_000, np.array([0.0, 0.0, 0.2 * 0.003 * i]))
     assert foot["seen"] == SEEN_KEPT
     assert foot["seen_speed"] == pytest.approx(0.2)
+
+
+def test_a_swing_that_is_calm_beside_impacts_is_no_stance() -> None:
+    filter_ = InertialFilter(FootSettings(), "left", floor=True)
+    used_in_swing = 0
+    for i in range(800):
+        t = 0.0025 * i
+        force, rate = np.array([0.0, GRAVITY, 0.0]), 0.0
+        if 1.0 <= t < 1.02:
+            force[0] = 80.0 * (-1.0) ** i
+        elif 1.5 <= t < 1.6:
+            force[0] = 10.0
+        elif t >= 1.6:
+            rate = 1.2
+            used_in_swing += bool(filter_.last_row[ZERO_SIGMA] > 0.0)
+        filter_.on_imu(ImuSample(round(t * 1e9), force, np.array([0.0, rate, 0.0]), None))
+        if t >= 1.8:
+            break
+    assert used_in_swing > 10  # by its statistic alone it would stand
+    assert float(np.linalg.norm(filter_.state[0][3:6])) == pytest.approx(1.0, abs=0.05)
