@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from foottrack_protocol.messages import Optical
 from foottrack_service.rotations import Array
 
@@ -35,11 +33,12 @@ class Fix:
 
     def body(self) -> Optical:
         """The message's `data`. Raises ValueError (pydantic's) for what the wire does not take."""
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = self.cov.tolist()
         return Optical(
             p=tuple(self.p.tolist()),
             q=None if self.q is None else tuple(self.q.tolist()),
             q_alt=None if self.q_alt is None else tuple(self.q_alt.tolist()),
-            cov=tuple(self.cov[np.triu_indices(3)].tolist()),
+            cov=(xx, xy, xz, yy, yz, zz),
             size_ratio=self.size_ratio,
             reproj_px=self.reproj_px,
             edge_px=self.edge_px,

@@ -2,7 +2,7 @@
 
 ``rgb.txt`` and ``depth.txt`` list ``timestamp path`` a line, ``#`` begins a comment; depth pictures are 16 bit, one
 metre is 5000. Colour and depth that are at most 20 ms apart belong together. A picture may also be an array in numpy's
-format (``.npy``), which is mapped into memory: it needs no decoding.
+format (``.npy``), which is mapped into memory, once: it needs no decoding, and costs what a camera's picture does.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from bisect import bisect_left
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from foottrack_service.camera.frame import DepthMap, Frame, SourceEnded, SourceE
 from foottrack_service.camera.rig import Intrinsics
 
 _TOGETHER_S = 0.02
+_MAPPED = 4096
+"""Arrays that stay mapped; an operating system allows some 65,000."""
 
 
 class FolderSource:
@@ -47,6 +50,7 @@ class FolderSource:
             raise SourceError(f"{path / 'rgb.txt'} lists no pictures")
         self._shift: int | None = 0 if now is None else None
         self._next = 0
+        self._mapped = lru_cache(_MAPPED)(_map)
 
     def read(self) -> Frame:
         """The next picture. Raises SourceEnded, and SourceError for a picture that cannot be read."""
@@ -61,7 +65,7 @@ class FolderSource:
         number, self._next = self._next, self._next + 1
         stamp, name = self._colour[number % len(self._colour)]
         t = self._taken(number)
-        gray = _pixels(self._path / name, cv2.IMREAD_GRAYSCALE)
+        gray = self._pixels(self._path / name, cv2.IMREAD_GRAYSCALE)
         if gray is None or gray.dtype != np.uint8 or gray.ndim != 2:
             raise SourceError(f"{self._path / name} is no picture")
         if gray.shape != (self.intrinsics.height, self.intrinsics.width):
@@ -73,7 +77,8 @@ class FolderSource:
         return frame
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Let go of the mapped arrays."""
+        self._mapped.cache_clear()
 
     def _has(self, number: int) -> bool:
         return self._loop or number < len(self._colour)
@@ -93,15 +98,16 @@ class FolderSource:
         near = min(self._depth[max(at - 1, 0) : at + 1], key=lambda entry: abs(entry[0] - stamp), default=None)
         if near is None or abs(near[0] - stamp) > _TOGETHER_S:
             return None
-        depth = _pixels(self._path / near[1], cv2.IMREAD_UNCHANGED)
+        depth = self._pixels(self._path / near[1], cv2.IMREAD_UNCHANGED)
         if depth is None or depth.dtype != np.uint16 or depth.ndim != 2:
             raise SourceError(f"{self._path / near[1]} is no 16 bit depth picture")
         return np.asarray(depth, np.uint16)
 
+    def _pixels(self, path: Path, mode: int) -> npt.NDArray[Any] | None:
+        return self._mapped(path) if path.suffix == ".npy" else cv2.imread(str(path), mode)
 
-def _pixels(path: Path, mode: int) -> npt.NDArray[Any] | None:
-    if path.suffix != ".npy":
-        return cv2.imread(str(path), mode)
+
+def _map(path: Path) -> npt.NDArray[Any] | None:
     try:
         # Copy on write: a picture like any other to compiled kernels, which tell arrays apart that cannot be written.
         return np.asarray(np.load(path, mmap_mode="c"))
