@@ -33,8 +33,9 @@ from foottrack_service.fusion.mount_calibration import MountCalibrator
 from foottrack_service.fusion.pictures_only import PicturesOnlyFilter
 from foottrack_service.rotations import IDENTITY, Array
 
-SYSTEMATIC = 0.002
-"""m per axis: what no amount of agreeing fixes takes away (lens, depth scale, head pose, where the tag is glued)."""
+SYSTEMATIC, WITH_FLOOR = 0.002, 0.0014
+"""m per axis: what no amount of agreeing fixes takes away (lens, depth scale, head pose, where the tag is glued); and
+what is left of it where the floor has had its say in the depth scale."""
 SEEN_S = 0.3
 """A fix accepted so recently shows that its foot is still tracked by its own."""
 
@@ -136,7 +137,8 @@ class ErrorStateFilter:
         if seen and not (inertial.begun and self._ladder.imu_alive(t)):
             source = pictures
         p, q, v, sd = source.predicted(t)
-        sigma = BALL_68_OF_ONE_AXIS * math.hypot(sd, SYSTEMATIC)
+        with_floor = source is inertial and inertial.knows_range
+        sigma = BALL_68_OF_ONE_AXIS * math.hypot(sd, WITH_FLOOR if with_floor else SYSTEMATIC)
         return FootEstimate(t, p, q, v, source.contact, self._ladder.stage(t, sigma), sigma, self._ladder.age(t))
 
 

@@ -43,8 +43,8 @@ POINT = 1
 POINT_COV = 4
 """9 columns."""
 ACCEPTED = 13
-NORMAL = 14
-"""The tag's face, about which its turn is seen best, 3 columns."""
+FACE = 14
+"""The tag's normal, sensor frame, about which its turn is seen best, 3 columns."""
 MEASURED_Q = 17
 """The sensor's attitude by the tag, 4 columns."""
 TURN_SIGMA = 21

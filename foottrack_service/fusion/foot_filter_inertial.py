@@ -43,6 +43,7 @@ from foottrack_service.fusion.foot_filter_optical import (
     take_fix,
 )
 from foottrack_service.fusion.foot_filter_output import CONTACT, predicted
+from foottrack_service.fusion.foot_filter_range import SCALE, SEEN
 from foottrack_service.fusion.foot_filter_replay import attitude_error
 from foottrack_service.fusion.foot_filter_sample import FIRST, JUMPED, LEFT_OUT, first_state, take_sample, upright
 from foottrack_service.fusion.interface import ImuSample, Kind, Moves, OpticalFix, Verdict, Whereabouts
@@ -99,6 +100,7 @@ class InertialFilter:
         """Floor height in the stage, m."""
         self._floor = height
         self._foot["floor"] = height + self._settings.ankle_height if self._use_floor else math.nan
+        self._foot["range"] = 0.0
 
     def set_imu_yaw(self, yaw: float) -> None:
         """Yaw of the device's own frame in the stage, rad: counts until a tag shows the foot's."""
@@ -148,7 +150,8 @@ class InertialFilter:
         if implausible(fix) is None and self.begun and self.acquired and fix.t <= self.newest:
             ankle, q, _, sd = self.predicted(fix.t)
             if sd < SURE_SIGMA:
-                self._blob.learn(ankle, q, fix.head.p + rot.rotate(fix.head.q, fix.p))
+                p = fix.p / (1.0 + self._foot["range"][0, SCALE])
+                self._blob.learn(ankle, q, fix.head.p + rot.rotate(fix.head.q, p))
                 self._place_blob()
 
     def move(self, p: Array, q: Array) -> None:
@@ -189,6 +192,11 @@ class InertialFilter:
     @acquired.setter
     def acquired(self, value: bool) -> None:
         self._foot["acquired"] = value
+
+    @property
+    def knows_range(self) -> bool:
+        """Whether the floor has shown by how much the camera's depths are too long."""
+        return bool(self._foot["range"][0, SEEN] > 0.0)
 
     @property
     def newest(self) -> int:

@@ -48,6 +48,9 @@ FOOT = np.dtype(
         ("seen_t", np.int64, SEEN_KEPT),
         ("seen_p", np.float64, (SEEN_KEPT, 3)),
         ("seen_speed", np.float64),
+        # When a tag was last accepted, and by how much the camera's depths are too long (foot_filter_range.py).
+        ("tag_t", np.int64),
+        ("range", np.float64, 3),
         # The newest fix: its event, and how far it is from where it was expected, m.
         ("fix_at", np.int64),
         ("residual", np.float64, 3),
@@ -85,5 +88,6 @@ def new_foot() -> Feet:
     """The memory of a foot of which nothing is known."""
     foot = np.zeros(1, FOOT)
     foot["forces"][0, 1] = 1.0  # like no sample's, and unlike the other's
+    foot["tag_t"] = -(2**62)
     # Where nothing is compiled Python has to find a record's fields by name. (Such an array costs a call 3 us.)
     return foot.view(np.recarray) if compiling_is_off() else foot

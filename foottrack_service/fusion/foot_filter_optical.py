@@ -15,12 +15,12 @@ from foottrack_service.fusion.foot_filter_doubt import NOT_OURS
 from foottrack_service.fusion.foot_filter_events import (
     ACCEPTED,
     ARM,
+    FACE,
     FIX,
     GYRO,
     IMU,
     KIND,
     MEASURED_Q,
-    NORMAL,
     PLACED_DELAY,
     POINT,
     POINT_COV,
@@ -28,8 +28,9 @@ from foottrack_service.fusion.foot_filter_events import (
     ZERO_SIGMA,
 )
 from foottrack_service.fusion.foot_filter_kernel import NE, invert3, seen_through
-from foottrack_service.fusion.foot_filter_memory import DEPTH, Feet, Foot
-from foottrack_service.fusion.foot_filter_replay import attitude_error, point_model, replay
+from foottrack_service.fusion.foot_filter_memory import DEPTH, MARKER, Feet, Foot
+from foottrack_service.fusion.foot_filter_range import SCALE, learn_range
+from foottrack_service.fusion.foot_filter_replay import attitude_error, point_model, replay, turn_off
 from foottrack_service.fusion.interface import FIX_MEMORY_S, OpticalFix, Verdict
 from foottrack_service.fusion.timeline import place
 from foottrack_service.rotations import Array
@@ -136,6 +137,10 @@ def take_fix(foot: Feet, t: int, kind: int, has_q: bool, has_alt: bool) -> int:
     if squared(residual[0]) + squared(residual[1]) + squared(residual[2]) > NOT_OURS**2:
         return FAR
     _accept(s, i)
+    if kind == MARKER:
+        s.tag_t = t
+        if s.seen_speed == 0.0 and s.last[ZERO_SIGMA] > 0.0:
+            learn_range(s, x)
     replay(s, i, s.n)
     return TAKEN
 
@@ -163,7 +168,8 @@ def _accept(s: Foot, i: int) -> None:
 def _fill_fix(s: Foot, row: Array, kind: int, delay: float) -> None:
     """Place and noise, in the stage."""
     row[KIND] = FIX
-    R, p = rotation(quaternion(s.head_q, 0)), vector(s.p, 0)
+    R, shorter = rotation(quaternion(s.head_q, 0)), 1.0 / (1.0 + s.range[SCALE])
+    p = (shorter * s.p[0], shorter * s.p[1], shorter * s.p[2])
     cov = (vector(s.cov[0], 0), vector(s.cov[1], 0), vector(s.cov[2], 0))
     seen = turned(R, p)
     noise = HEAD_NOISE**2 + HEAD_TURN_NOISE**2 * (p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
@@ -203,11 +209,11 @@ def _take_attitude(s: Foot, row: Array, x: Array, has_q: bool, has_alt: bool) ->
         return False
     if least <= TILT_USABLE:
         q = product(best, to_marker)
-        R = rotation(best)
+        face = rotation(to_marker)[2]
         for k in range(4):
             row[MEASURED_Q + k] = q[k]
         for k in range(3):
-            row[NORMAL + k] = R[k][2]
+            row[FACE + k] = face[k]
         across2 = TURN_PER_METRE * TURN_PER_METRE * max(0.0, _smallest(s.cov[:]))
         row[TURN_SIGMA] = math.sqrt(LEAST_TURN_SIGMA * LEAST_TURN_SIGMA + across2)
     return True
@@ -246,11 +252,10 @@ def _judged(row: Array, x: Array, P: Array, rate: Vector) -> tuple[float, float,
     place = residual[0] * y[0] + residual[1] * y[1] + residual[2] * y[2] if found else np.inf
     turn = 0.0
     if row[TURN_SIGMA] > 0.0:
-        error = attitude_error(quaternion(row, MEASURED_Q), x)
-        variance, across = squared(row[TURN_SIGMA]), 0.0
+        normal, across = turn_off(row, x)
+        variance = squared(row[TURN_SIGMA])
         for i in range(3):
-            across += row[NORMAL + i] * error[i]
             for j in range(3):
-                variance += row[NORMAL + i] * P[6 + i, 6 + j] * row[NORMAL + j]
+                variance += normal[i] * P[6 + i, 6 + j] * normal[j]
         turn = across * across / variance
     return place, turn, residual

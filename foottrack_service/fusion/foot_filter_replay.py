@@ -29,13 +29,13 @@ from foottrack_service.fusion.foot_filter_events import (
     ACCEPTED,
     ARM,
     CLIPPED,
+    FACE,
     FLOOR,
     GYRO,
     IMU,
     KIND,
     MEAN_RATE,
     MEASURED_Q,
-    NORMAL,
     PLACED_DELAY,
     POINT,
     POINT_COV,
@@ -155,6 +155,18 @@ def attitude_error(q: Quaternion, x: Array) -> Vector:
 
 
 @compiled
+def turn_off(row: Array, x: Array) -> tuple[Vector, float]:
+    """The tag's normal in the stage by the state, and the turn about it from the state's attitude to the seen one, rad.
+
+    The seen normal is off by degrees, another way in each picture: taken for the axis, it makes every picture of a foot
+    that stands tell a bit of its tilt, and a second of them what nobody can know.
+    """
+    normal = turned(rotation(quaternion(x, 6)), vector(row, FACE))
+    error = attitude_error(quaternion(row, MEASURED_Q), x)
+    return normal, normal[0] * error[0] + normal[1] * error[1] + normal[2] * error[2]
+
+
+@compiled
 def fix_updates(row: Array, x: Array, P: Array, rate: Vector) -> None:
     """An accepted fix: the target's place and, where it has one, its turn about the target's face."""
     h, H = np.empty(3), np.empty((3, NE))
@@ -162,12 +174,10 @@ def fix_updates(row: Array, x: Array, P: Array, rate: Vector) -> None:
     noise = row[POINT_COV : POINT_COV + 9].reshape(3, 3)
     update3(x, P, H, (row[POINT] - h[0], row[POINT + 1] - h[1], row[POINT + 2] - h[2]), noise, np.inf)
     if row[TURN_SIGMA] > 0.0:
-        error = attitude_error(quaternion(row, MEASURED_Q), x)
+        normal, innovation = turn_off(row, x)
         H1 = np.zeros(NE)
-        innovation = 0.0
         for i in range(3):
-            H1[6 + i] = row[NORMAL + i]
-            innovation += row[NORMAL + i] * error[i]
+            H1[6 + i] = normal[i]
         update1(x, P, H1, innovation, squared(row[TURN_SIGMA]), np.inf)
 
 

@@ -47,6 +47,10 @@ anything it has ever given. (Coarse or smooth samples repeat by chance, some eve
 velocity 0.14 m/s of its certainty.)"""
 STRONGEST_S = 600.0
 """How fast the strongest ever is forgotten: one damaged sample must not hide an accelerometer's end for good."""
+TAG_MEMORY_NS = 250_000_000
+"""Whose tag was seen so lately does not ask the floor: it has been weighed against the camera (foot_filter_range). Both
+asked in turn, each as if it erred anew every time, they tilt the foot by what lies between them.
+"""
 LEAST_FORCE = 1.0
 """m/s^2: a sensor in free fall does not know where up is."""
 DEVICE_TILT = 0.03
@@ -92,7 +96,7 @@ def take_sample(foot: Feet, t: int, has_gyro: bool, has_q: bool) -> int:
         if sigma > 0.0:
             row[ZERO_SIGMA] = math.sqrt(sigma * sigma + s.seen_speed * s.seen_speed)
         rest(s, row, s.P[i - 1], dt if sigma > 0.0 and s.seen_speed == 0.0 else 0.0)
-        row[FLOOR] = s.floor
+        row[FLOOR] = math.nan if abs(t - s.tag_t) < TAG_MEMORY_NS else s.floor
         replay(s, i, s.n)
     for k in range(COLUMNS):
         s.last[k] = row[k]
