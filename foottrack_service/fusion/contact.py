@@ -14,7 +14,7 @@ import math
 from foottrack_service.compiled import compiled
 from foottrack_service.fusion.compiled_rotations import Vector, quaternion, rotation, squared, turned
 from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE, REST_RATE, REST_S, ROLL, Stamps
-from foottrack_service.fusion.foot_filter_kernel import GRAVITY
+from foottrack_service.fusion.foot_filter_kernel import GRAVITY, speed_distance
 from foottrack_service.fusion.foot_filter_memory import SEEN_KEPT, Foot
 from foottrack_service.rotations import Array
 
@@ -41,6 +41,12 @@ PUSH, PUSH_SHARE = 0.5, 0.3
 DOUBT_S = 1.0
 """A push that lasts for longer, in silence, is no push but a wrong tilt."""
 
+CALM_SIGMA, CALM_GATE = 0.04, 12.0
+"""m/s; who is not quiet by itself, but only beside a swing full of impacts, may be in the middle of the next one: so a
+speed beyond this chi-square is believed rather. In real recordings of walks and runs no stance is further off."""
+CALM_S = 0.25
+"""No middle of a swing is calm for longer: then it is the speed that is wrong."""
+
 QUIET_STATISTIC = 0.25
 """A foot this quiet may show its gyro's bias ..."""
 REST_BLOCK_S, FIRST_BLOCK_S = 0.5, 0.1
@@ -54,9 +60,9 @@ SEEN_LEAST = 6
 SEEN_NOISE = 0.04
 """m/s: fixes of a standing foot may drift apart by so much through errors of the camera's mount."""
 
-# memory, shape (4,): the swing's peak that fades, the newest sample's statistic, how long it was pushed, and for how
-# many seconds in all it did not stand
-PEAK, STATISTIC, DOUBTED, UNREST = 0, 1, 2, 3
+# memory, shape (5,): the swing's peak that fades, the newest sample's statistic, how long it was pushed, for how many
+# seconds in all it did not stand, and how long it seemed to stand at a speed that it cannot have then
+PEAK, STATISTIC, DOUBTED, UNREST, TOO_FAST = 0, 1, 2, 3, 4
 
 # rest, shape (8,): for how long the foot has rested, s, and its turn meanwhile, rad; the same of the block before that,
 # but as a mean rate, rad/s
@@ -109,7 +115,7 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
 
     Writes into the row how the foot turns meanwhile: over its ball, from long before the heel is seen to rise.
 
-    ``dt``, s, since the last sample; ``x`` and ``P`` the filter before it; ``memory``, shape (4,), is carried from
+    ``dt``, s, since the last sample; ``x`` and ``P`` the filter before it; ``memory``, shape (5,), is carried from
     sample to sample.
     """
     statistic, mean, rate = stillness(t, rows, i, (x[10], x[11], x[12]))
@@ -129,13 +135,22 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
         memory[DOUBTED] += dt
         if memory[DOUBTED] < DOUBT_S:
             return 0.0
+    sigma = STILL_SIGMA + SIGMA_GROWTH * statistic
+    # A device's corrections of its own tilt look like rolling: believed, they cost more than rolling does.
+    rolls = rows[i, MEAN_RATE] != 1.0
+    if rolls:
+        turning = math.sqrt(squared(rate[0] - x[13]) + squared(rate[1] - x[14]) + squared(rate[2] - x[15]))
+        sigma += LEVER * turning
+    if sigma > CALM_SIGMA and speed_distance(x, P, (0.0, 0.0, 0.0), sigma * sigma) > CALM_GATE:
+        memory[TOO_FAST] += dt
+        if memory[TOO_FAST] < CALM_S:
+            return 0.0
+    else:
+        memory[TOO_FAST] = 0.0
     memory[UNREST] -= dt
-    if rows[i, MEAN_RATE] == 1.0:
-        # A device's corrections of its own tilt look like rolling: believed, they cost more than rolling does.
-        return STILL_SIGMA + SIGMA_GROWTH * statistic
-    rows[i, ROLL], rows[i, ROLL + 1], rows[i, ROLL + 2] = rate
-    turning = math.sqrt(squared(rate[0] - x[13]) + squared(rate[1] - x[14]) + squared(rate[2] - x[15]))
-    return STILL_SIGMA + SIGMA_GROWTH * statistic + LEVER * turning
+    if rolls:
+        rows[i, ROLL], rows[i, ROLL + 1], rows[i, ROLL + 2] = rate
+    return sigma
 
 
 @compiled

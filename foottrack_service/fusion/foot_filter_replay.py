@@ -60,7 +60,6 @@ from foottrack_service.fusion.foot_filter_kernel import (
     NX,
     floor_covariance,
     propagate,
-    speed_distance,
     update1,
     update3,
     update_speed,
@@ -79,9 +78,6 @@ HOLE_WALK, FUSED_HOLE_WALK = 0.7, 0.03
 LONGEST_HOLE_S = 1.0
 ZERO_GATE = 30.0
 """A stance never overrules a velocity that is clearly known: chi-square, 3 degrees of freedom."""
-DOUBTFUL_SIGMA, DOUBTFUL_GATE = 0.04, 12.0
-"""m/s; who is not quiet by itself, but only beside a swing full of impacts, may be in the middle of the next one: its
-sigma counts as it is, not per sample. In real recordings of walks and runs no stance is further off than 7."""
 FLOOR_GATE = 12.0
 FLOOR_SIGMA = 0.005
 """m, of a standing ankle's height."""
@@ -265,9 +261,7 @@ def _inertial_updates(s: Foot, row: Array, x: Array, P: Array, dt: float) -> Non
     h = np.zeros(NE)
     sigma = row[ZERO_SIGMA]
     if sigma > 0.0:
-        speed = _rolling(s, row, x)
-        held = sigma < DOUBTFUL_SIGMA or speed_distance(x, P, speed, sigma * sigma) < DOUBTFUL_GATE
-        held = held and update_speed(x, P, speed, sigma * sigma * 0.01 / dt, ZERO_GATE) <= ZERO_GATE
+        held = update_speed(x, P, _rolling(s, row, x), sigma * sigma * 0.01 / dt, ZERO_GATE) <= ZERO_GATE
         if held and row[FLOOR] == row[FLOOR]:
             R = rotation(quaternion(x, 6))
             up = turned(R, vector(s.foot_up, 0))
