@@ -2,8 +2,9 @@
 
 Fixed-interval smoother (H. Rauch, F. Tung, C. Striebel, Maximum likelihood estimates of linear dynamic systems, 1965)
 over position, velocity and the accelerometer's bias (9 states) of the sensor, driven by its specific force, corrected
-by the tags that our filter accepted and that were true, and by the stances that really were. Attitude is the truth's.
-It sees the future and cannot be fooled; it has the same samples, camera and noise figures as our filter.
+by the tags that our filter accepted and that were true, and by the stances that really were. Attitude is the truth's,
+and so is the camera's depth scale, of which our filter learns most from the floor. It sees the future and cannot be
+fooled; it has the same samples, camera and noise figures as our filter.
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ def smoothed(
     heel, toe = track.contact(times)
     by_time: dict[float, OpticalFix] = dict(zip(seen.tolist(), fixes, strict=True))
     tag_arm = np.array(foot.marker.p) - np.array(foot.imu.p)
+    shorter = 1.0 / _depth_scale(fixes, track.point(seen, foot.marker.p))
 
     n = len(times)
     X, P = np.zeros((n, 9)), np.zeros((n, 9, 9))
@@ -74,7 +76,7 @@ def smoothed(
         fix = by_time.get(float(times[i]))
         if fix is not None:
             head = rot.to_matrix(fix.head.q)
-            z = fix.head.p + head @ fix.p - rot.rotate(ankle_q[i], tag_arm)
+            z = fix.head.p + shorter * head @ fix.p - rot.rotate(ankle_q[i], tag_arm)
             x, C = _updated(x, C, 0, z, head @ fix.cov @ head.T + PICTURE_NOISE**2 * np.eye(3))
         if heel[i] and toe[i]:
             x, C = _updated(x, C, 3, np.zeros(3), STANCE_SIGMA**2 * np.eye(3))
@@ -83,6 +85,12 @@ def smoothed(
         gain = np.linalg.solve(P_before[i + 1], F[i + 1] @ P[i]).T
         X[i] += gain @ (X[i + 1] - X_before[i + 1])
     return times, X[:, :3] - lever
+
+
+def _depth_scale(fixes: list[OpticalFix], tags: Array) -> float:
+    """By how much the tags, which were at ``tags`` (n, 3), m, seem further from the head than they were."""
+    away = [np.linalg.norm(tag - fix.head.p) for fix, tag in zip(fixes, tags, strict=True)]
+    return float(np.median([np.linalg.norm(fix.p) for fix in fixes] / np.array(away)))
 
 
 def _updated(x: Array, P: Array, first: int, z: Array, noise: Array) -> tuple[Array, Array]:
