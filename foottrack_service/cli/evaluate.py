@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.status import Status
 from rich.table import Table
 
+from foottrack_service.cli.evaluate_faults import fault_recovery_table
 from foottrack_service.cli.running import EXIT_USAGE, CommandFailed, JsonOption, print_json
 
 _WIDTH = 140
@@ -37,8 +38,8 @@ def evaluate(
         str | None,
         typer.Option(
             "--sections",
-            help=f"Of tasks, technical, study, variants, gaps, covered; or all. {','.join(DEFAULT_SECTIONS)} if absent,"
-            " and tasks alone with --camera rendered.",
+            help="Of tasks, technical, study, variants, gaps, covered, faults; or all."
+            f" {','.join(DEFAULT_SECTIONS)} if absent, and tasks alone with --camera rendered.",
         ),
     ] = None,
     camera: Annotated[
@@ -138,15 +139,21 @@ def _draw(
 
 
 def _simulated(tasks: list[str], seeds: list[int], sections: list[Any], camera: Any, quiet: bool) -> dict[str, Any]:
+    from foottrack_service.evaluation.fault_recovery import fault_jobs, fault_table, run_fault_jobs
     from foottrack_service.evaluation.sections import jobs_of, run_jobs, tables
 
+    faults = fault_jobs(tasks, seeds) if "faults" in sections else []
+    sections = [section for section in sections if section != "faults"]
     jobs = [job for section in sections for job in jobs_of(section, tasks, seeds, camera)]
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet) as progress:
-        bar = progress.add_task("simulating and fusing", total=len(set(jobs)))
+        bar = progress.add_task("simulating and fusing", total=len(set(jobs)) + len(faults))
         results = run_jobs(jobs, lambda done: progress.update(bar, advance=1, description=done.job.task))
+        recoveries = run_fault_jobs(faults, lambda task: progress.update(bar, advance=1, description=task))
     found: dict[str, Any] = {section: tables(section, results, tasks, seeds, camera) for section in sections}
     found.setdefault("tasks", {})
+    if faults:
+        found["faults"] = fault_table(recoveries)
     return found
 
 
@@ -176,12 +183,13 @@ def _chosen_seeds(text: str) -> list[int]:
 def _chosen_sections(text: str) -> list[Any]:
     from foottrack_service.evaluation.sections import SECTIONS
 
+    known = (*SECTIONS, "faults")
     if text == "all":
-        return list(SECTIONS)
+        return list(known)
     chosen = [name.strip() for name in text.split(",") if name.strip()]
     for name in chosen:
-        if name not in SECTIONS:
-            raise CommandFailed(f"no section is called {name!r}; there are: {', '.join(SECTIONS)}, all", EXIT_USAGE)
+        if name not in known:
+            raise CommandFailed(f"no section is called {name!r}; there are: {', '.join(known)}, all", EXIT_USAGE)
     return chosen
 
 
@@ -201,6 +209,8 @@ def _as_tables(results: dict[str, Any]) -> list[Table]:
         shown.append(_study_table(results["study"]))
     if "gaps" in results:
         shown.append(_gap_table(results["gaps"]))
+    if "faults" in results:
+        shown.append(fault_recovery_table(results["faults"]))
     if "real" in results:
         for name, title in _REAL_TITLES.items():
             shown.append(_plain_table(title, results["real"][name]))

@@ -12,7 +12,7 @@ from foottrack_service.config import Settings
 from foottrack_service.rotations import Array
 from foottrack_service.simulation import camera, faults
 from foottrack_service.simulation.imu import ImuSamples
-from foottrack_service.simulation.optical import OpticalSamples, put_false
+from foottrack_service.simulation.optical import OpticalSamples, lay_flat, put_false
 from foottrack_service.simulation.truth import BOTH, Flags, Truth
 
 Drawn = Sequence[tuple[faults.Fault, np.random.Generator]]
@@ -54,9 +54,11 @@ def on_markers(samples: Mapping[Side, OpticalSamples], truth: Truth, settings: S
     for fault, random in drawn:
         if isinstance(fault, faults.FalseTags):
             found = samples[fault.side]
-            spots, seen = _floor_spot(truth, settings, found, random)
+            spots, seen = _floor_spot(truth, settings, found, fault, random)
             chosen = faults.chosen(fault, found.t, fault.share, random)
             put_false(found, chosen & seen, spots, truth, settings, random)
+            if fault.lies:
+                lay_flat(found, chosen & seen, truth, random)
         elif isinstance(fault, faults.WrongIdentity):
             other = samples["right" if fault.side == "left" else "left"]
             _copy(other, samples[fault.side], fault.covers(other.t) & other.found)
@@ -95,11 +97,16 @@ def _copy(source: OpticalSamples, to: OpticalSamples, where: Flags) -> None:
 
 
 def _floor_spot(
-    truth: Truth, settings: Settings, found: OpticalSamples, random: np.random.Generator
+    truth: Truth, settings: Settings, found: OpticalSamples, fault: faults.Fault, random: np.random.Generator
 ) -> tuple[Array, Flags]:
-    """A spot on the floor before the feet: its pixels (n, 2), and whether it is in the picture."""
+    """A spot on the floor before the feet amid the fault: its pixels (n, 2), and whether it is in the picture."""
     middle = 0.5 * (truth.left.pose(found.t)[0] + truth.right.pose(found.t)[0])
-    spot = middle[len(middle) // 2] + [random.uniform(-0.4, 0.4), 0.0, random.uniform(-0.5, 0.2)]
+    amid = np.flatnonzero(fault.covers(found.t))
+    spot = middle[amid[len(amid) // 2] if len(amid) else 0] + [
+        random.uniform(-0.4, 0.4),
+        0.0,
+        random.uniform(-0.5, 0.2),
+    ]
     spot[1] = 0.0
     eye = camera.eye(truth, found.t, settings.camera.mount, ())
     pixels, depth = camera.project(eye, np.broadcast_to(spot, middle.shape))

@@ -90,10 +90,14 @@ class CameraBlackout(Fault):
 
 @dataclass(frozen=True, kw_only=True)
 class FalseTags(Fault):
-    """A thing on the floor is taken for one shoe's tag, in a share of the pictures, always at the same spot."""
+    """A thing on the floor is taken for one shoe's tag, in a share of the pictures, always at the same spot.
+
+    `lies`: it is a tag, which lies flat and always looks the same; else its attitude is another in each picture.
+    """
 
     side: Side
     share: float = 0.8
+    lies: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

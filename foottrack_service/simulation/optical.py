@@ -37,6 +37,8 @@ _FLIP_SHARE = 0.12  # single tags: 15 to 21 % of small ones in real pictures
 _LATENCY_S, _LATENCY_JITTER_S = 0.030, 0.8e-3  # s from mid-exposure to publishing
 _STAMP_JITTER_SD = 0.2e-3
 
+_LYING_SD = 0.03  # rad, and share of the size, of a tag that lies on the floor
+_FACE_UP = np.array([-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)])  # tag to stage
 _BLOB = np.array([0.0, -0.03, -0.11])  # m, foot frame: middle of what a depth camera sees of a shoe from above
 _BLOB_SD = 0.008  # m, per shoe
 _BLOB_WANDER, _BLOB_TAU_S = 0.004, 0.8  # m, as the visible part changes
@@ -202,6 +204,19 @@ def put_false(
     samples.edge_px[where] = np.maximum(border - 12.0, 0.0)[where]
     samples.found[where] = True
     samples.false[where] = True
+
+
+def lay_flat(samples: OpticalSamples, where: Flags, truth: Truth, random: np.random.Generator) -> None:
+    """Let false finds be a tag of the right size that lies on the floor and always looks the same."""
+    n = len(samples.t)
+    flat = rotations.multiply(rotations.from_yaw(random.uniform(-math.pi, math.pi)), _FACE_UP)
+    noise_q = rotations.from_rotation_vector(_LYING_SD * random.standard_normal((n, 3)))
+    seen = rotations.multiply(rotations.conjugate(truth.head.pose(samples.t)[1]), rotations.multiply(flat, noise_q))
+    ratio = 1.0 + _LYING_SD * random.standard_normal(n)
+    if samples.q is not None:
+        samples.q[where] = seen[where]
+    if samples.size_ratio is not None:
+        samples.size_ratio[where] = ratio[where]
 
 
 def blobs(
