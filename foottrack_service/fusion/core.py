@@ -35,11 +35,15 @@ from foottrack_service.fusion.gait_link import GaitLink
 from foottrack_service.fusion.head_history import HeadHistory
 from foottrack_service.fusion.interface import FootEstimate, HeadSample
 from foottrack_service.fusion.mount_watch import MountWatch
+from foottrack_service.fusion.punctuality import Punctuality
 from foottrack_service.rotations import Array
 
 SOURCE = "fusion"
 _MOST_DISTANCE = 1000.0
 """m: a head further from the stage's origin is no pose."""
+_AHEAD_NS = 100_000_000
+"""What is stamped by so much later than it arrives comes from a clock that is wrong. (A clock over the network is known
+to a few ms, and a runtime may predict its poses to the next frame or two.)"""
 
 
 class FusionCore:
@@ -61,7 +65,7 @@ class FusionCore:
         self._sid = sid
         self._body = BodySolver(Skeleton.of(settings.body), settings.body.solver)
         self._gait = GaitLink(settings, self._body.skeleton)
-        self._heads = HeadHistory()
+        self._heads, self._head_punctual = HeadHistory(), Punctuality()
         self._origin: int | None = None
         self._calibrated: dict[tuple[str, Side | None], Any] = {}
         watched = settings.fusion.mount_calibration and settings.fusion.filter == "error-state"
@@ -97,6 +101,10 @@ class FusionCore:
             return []
         kind, _, tail = message.stream.partition("/")
         side: Side | None = "left" if tail == "left" else "right" if tail == "right" else None
+        if message.t - now > _AHEAD_NS:
+            for foot in self._feet.values() if side is None else (self._feet[side],):
+                foot.reject("ahead")
+            return []
         if kind == "imu" and side:
             return self._on_imu(side, message, now)
         if not message.valid:
@@ -146,6 +154,7 @@ class FusionCore:
                 self._watch.recentred()
             self._body.reset()
         self._origin = body.origin
+        self._heads.strange = self._head_punctual.is_strange(t, now)
         if not body.tracked or body.p is None or body.q is None or max(map(abs, body.p)) > _MOST_DISTANCE:
             self._heads.add_untracked(t)
             for foot in self._feet.values():

@@ -15,6 +15,7 @@ from foottrack_service.fusion.filters import MakeFilter, make_filter
 from foottrack_service.fusion.head_history import HeadHistory
 from foottrack_service.fusion.interface import FootEstimate, HeadSample, ImuSample, Kind, OpticalFix, Target, Verdict
 from foottrack_service.fusion.mount_watch import MountWatch
+from foottrack_service.fusion.punctuality import Punctuality
 from foottrack_service.rotations import Array
 
 MOST_ACCELERATION = 1000.0
@@ -25,6 +26,7 @@ MOST_DISTANCE = 20.0
 """m. No camera on a head sees its own feet further away."""
 MOST_VARIANCE = 100.0
 """m^2."""
+_DOUBTS = (Verdict.GATE, Verdict.UNCONFIRMED, Verdict.IDENTITY, Verdict.STALE)
 WAIT_FOR_HEAD_S = 0.1
 """How long a fix waits for the head pose that brackets it."""
 
@@ -35,6 +37,7 @@ class _Waiting:
     t: int
     arrived: int
     body: Optical
+    strange: bool
 
 
 class Foot:
@@ -52,6 +55,7 @@ class Foot:
         self._filter = make(settings, side)
         self._other: Foot | None = None
         self._heads = heads
+        self._punctual: dict[Kind, Punctuality] = {"marker": Punctuality(), "depth": Punctuality()}
         self._delay_ns = round(settings.timing.imu_delay * 1e9)
         self._acc_bias: Array | None = None
         self._gyro_bias: Array | None = None
@@ -104,12 +108,15 @@ class Foot:
         """A camera's fix made at ``t``, arriving at ``now`` (ns). It may have to wait for the head pose around it."""
         if math.dist(body.p, (0.0, 0.0, 0.0)) > MOST_DISTANCE or max(map(abs, body.cov)) > MOST_VARIANCE:
             self.reject("implausible")
+        elif self._punctual[kind].is_out_of_turn(t, now):
+            self.reject(Verdict.STALE)
         elif self._heads.newest is None:
             self.reject(Verdict.NO_HEAD_POSE)
         else:
+            strange = self._punctual[kind].is_strange(t, now) or self._heads.strange
             if len(self._waiting) == self._waiting.maxlen:
                 self.reject(Verdict.NO_HEAD_POSE)
-            self._waiting.append(_Waiting(kind, t, now, body))
+            self._waiting.append(_Waiting(kind, t, now, body, strange))
             self.settle(now)
 
     def settle(self, now: int) -> None:
@@ -178,10 +185,15 @@ class Foot:
         q_alt = None if body.q_alt is None else np.array(body.q_alt)
         xx, xy, xz, yy, yz, zz = body.cov
         cov = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        fix = OpticalFix(waiting.t, waiting.kind, p, q, q_alt, cov, body.size_ratio, body.edge_px, head, newest)
+        seen = (p, q, q_alt, cov, body.size_ratio, body.edge_px)
+        fix = OpticalFix(waiting.t, waiting.kind, *seen, head, newest, waiting.strange)
+        if self._watch is not None and fix.strange:
+            self._watch.doubt(fix.t)
         verdict = self._filter.on_fix(self._mounted(fix), now)
         if verdict is not Verdict.ACCEPTED:
             self._rejected[verdict] += 1
+            if self._watch is not None and verdict in _DOUBTS:
+                self._watch.doubt(fix.t)
             return
         self._accepted[waiting.kind] += 1
         if self._watch is not None:

@@ -18,6 +18,7 @@ from foottrack_service.fusion.foot_filter_events import (
     RESET,
     SPEED,
     SPEED_SIGMA,
+    TILT_SIGMA,
     TURN_SIGMA,
     YAW_SIGMA,
 )
@@ -37,6 +38,8 @@ class Rejected:
     """How well we know it, rad."""
     sigma: float
     arm: Array
+    lean: tuple[float, float] = (0.0, 0.0)
+    """Tilt by which the tag's attitude differs from ours, rad about x and z."""
 
 
 SPAN_S = 0.12
@@ -61,6 +64,8 @@ DRIFT = 0.5
 """m/s: so fast a foot that was sure may have gone wrong; what is further away is another thing."""
 TAG_YAW_SIGMA, HEAD_YAW_SIGMA = 0.1, 0.6
 """rad: how well a tag's attitude, and the head's, tell where the toes point."""
+LEANS = 0.3
+"""rad: who is overruled by tags that all lean so much against it does not know its tilt. (One tag errs by 0.2.)"""
 SAME_TURN = 0.12
 """rad: a tag that lies on the shoe as ours does is most likely ours, however sure the foot is of its place."""
 
@@ -91,7 +96,11 @@ class Candidates:
             agreeing = self._insisting()
             enough = self._insists is not None and rejected.t - self._insists[0] >= insist_s * 1e9 and bool(agreeing)
         elif sure_for is None:
-            agreeing = self._agreeing(max(SPAN_S, self._pace_s()), FASTEST, TURN_SLACK)
+            span = max(SPAN_S, self._pace_s())
+            agreeing = self._agreeing(span, FASTEST, TURN_SLACK)
+            if len(agreeing) < FEW:
+                # With a speed that is out of all reason nothing agrees.
+                agreeing = self._agreeing(span, FASTEST, TURN_SLACK, points=True)
             enough = len(agreeing) >= FEW
         else:
             agreeing = self._agreeing(SPAN_S, FASTEST, SAME_TURN)
@@ -126,15 +135,15 @@ class Candidates:
             return 0.0
         return 1.1e-9 * (self._kept[-1].t - self._kept[-FEW].t)
 
-    def _agreeing(self, span: float, fastest: float, turn_slack: float) -> list[Rejected]:
-        """Those of the last ``span`` s whose residuals lie on one straight drift with the newest one's."""
+    def _agreeing(self, span: float, fastest: float, turn_slack: float, *, points: bool = False) -> list[Rejected]:
+        """Those of the last ``span`` s whose residuals, or ``points``, lie on one straight drift with the newest's."""
         newest = self._kept[-1]
         found = [newest]
         for older in reversed(list(self._kept)[:-1]):
             if newest.t - older.t > span * 1e9:
                 break
             trial = [older, *found]
-            if _on_a_line(trial, fastest, turn_slack):
+            if _on_a_line(trial, fastest, turn_slack, points=points):
                 found = trial
         return found
 
@@ -159,12 +168,14 @@ def fill_reset(row: Array, agreed: list[Rejected], q: Array, toes: float | None)
         row[MEASURED_Q : MEASURED_Q + 4] = rot.multiply(rot.from_yaw(turn), q)
         row[TURN_SIGMA] = 1.0
         row[YAW_SIGMA] = TAG_YAW_SIGMA if turns else HEAD_YAW_SIGMA
+    lean = float(np.linalg.norm(np.median([k.lean for k in agreed], axis=0)))
+    row[TILT_SIGMA] = lean if lean > LEANS else 0.0
     return bool(turns)
 
 
-def _on_a_line(kept: list[Rejected], fastest: float, turn_slack: float) -> bool:
+def _on_a_line(kept: list[Rejected], fastest: float, turn_slack: float, *, points: bool) -> bool:
     t = np.array([(k.t - kept[-1].t) * 1e-9 for k in kept])
-    residuals = np.array([k.residual for k in kept])
+    residuals = np.array([k.point if points else k.residual for k in kept])
     slope = np.zeros(3)
     if len(kept) > 2:
         centred = t - t.mean()

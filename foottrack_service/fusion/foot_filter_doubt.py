@@ -24,6 +24,8 @@ SETTLES_S = 0.1
 """Unrest in all that a foot may show (its heel shifts, somebody bumps into it) and still be in its place."""
 LEAST_S, MOST_S = 0.3, 12.0
 """Between these is how long others must insist."""
+TRUSTED_S = 2.0
+"""A place that has been known for less is given up for less than that: it may be what others have just insisted on."""
 SAME_PLACE = 0.05
 """m, beyond three sigma."""
 OTHERS_S = 4.0
@@ -38,6 +40,8 @@ AT_OURS = 0.4
 """Share of the way from the other's place: what is nearer to ours may be ours, however it moved."""
 NOT_OURS = 0.05
 """m: a fix that is nearer to where we expect it is looked at no further."""
+PROBATION_S = 0.15
+"""A place that fixes have confirmed for less than this is given up as lightly as none."""
 SURE_AGE_S = 0.9
 SURE_SIGMA = 0.03
 """m per axis: a foot that knows its place so well, and was seen so lately, is no easy prey even when it moves."""
@@ -95,7 +99,9 @@ class Doubt:
 
         ``sigma``: m per axis, how well the foot knows its place; None when it does not.
         """
-        insist_s = None if sigma is None or self.whose.is_ours else self._insist_s(rejected, unrest)
+        insist_s = None
+        if sigma is not None and not self.whose.is_ours and self._known_s >= PROBATION_S:
+            insist_s = self._insist_s(rejected, unrest)
         if insist_s == 0.0 and rejected.turn is not None and abs(rejected.turn) > OTHER_WAY + 3.0 * rejected.yaw_sigma:
             insist_s = OTHER_WAY_S
         sure_for = None if insist_s is None or sigma is None else self._sure_for(sigma, rejected.t, kind)
@@ -154,7 +160,8 @@ class Doubt:
 
     @property
     def _lasting_s(self) -> float:
-        return min(max(self._known_s, LEAST_S), MOST_S)
+        known = self._known_s
+        return min(max(known * min(known / TRUSTED_S, 1.0), LEAST_S), MOST_S)
 
     def _certain(self, unrest: float) -> bool:
         return unrest - self._rested_at < SETTLES_S

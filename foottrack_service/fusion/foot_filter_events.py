@@ -43,12 +43,15 @@ POINT = 1
 POINT_COV = 4
 """9 columns."""
 ACCEPTED = 13
+"""0, or one of these."""
+TEACHES, PLACES = 1.0, 2.0
+"""Accepted; and accepted for the place alone: its stamp is in doubt, or was until now, and says nothing on delays."""
 FACE = 14
 """The tag's normal, sensor frame, about which its turn is seen best, 3 columns."""
 MEASURED_Q = 17
 """The sensor's attitude by the tag, 4 columns."""
 TURN_SIGMA = 21
-"""rad; 0 without an attitude."""
+"""rad; 0 without an attitude, negative where it leans too much to be believed."""
 PLACED_DELAY = 22
 """The time offset with which the fix was put into the timeline, s."""
 ARM = 23

@@ -22,15 +22,20 @@ from foottrack_service.fusion.foot_filter_events import (
     ACCEPTED,
     ARM,
     FIX,
+    GYRO,
+    IMU,
     KIND,
     MEASURED_Q,
+    PLACES,
     POINT,
     POINT_COV,
+    TILT_SIGMA,
     TURN_SIGMA,
     ZERO_SIGMA,
 )
 from foottrack_service.fusion.foot_filter_kernel import NE
 from foottrack_service.fusion.foot_filter_memory import DEPTH, MARKER, new_foot
+from foottrack_service.fusion.foot_filter_models import attitude_error
 from foottrack_service.fusion.foot_filter_optical import (
     FAR,
     IMPOSSIBLE,
@@ -44,7 +49,6 @@ from foottrack_service.fusion.foot_filter_optical import (
 )
 from foottrack_service.fusion.foot_filter_output import CONTACT, predicted
 from foottrack_service.fusion.foot_filter_range import SCALE, SEEN
-from foottrack_service.fusion.foot_filter_replay import attitude_error
 from foottrack_service.fusion.foot_filter_sample import FIRST, JUMPED, LEFT_OUT, first_state, take_sample, upright
 from foottrack_service.fusion.interface import ImuSample, Kind, Moves, OpticalFix, Verdict, Whereabouts
 from foottrack_service.fusion.timeline import Timeline
@@ -53,6 +57,8 @@ from foottrack_service.rotations import Array
 
 FEET_APART = {"left": -0.1, "right": 0.1}
 """m: where a foot stands that only an IMU knows (PROTOCOL, results)."""
+JUMP_S, JUMP_TURN_S = 0.01, 0.03
+"""A clock that was set back goes on so long after the last sample; for so long nobody noticed how the foot turned."""
 KNOWN_SIGMA = 0.25
 """m per axis: of a foot that may claim a fix."""
 
@@ -135,7 +141,7 @@ class InertialFilter:
         if has_alt:
             self._q_alt[:] = fix.q_alt
         kind = DEPTH if fix.kind == "depth" else MARKER
-        taken = take_fix(self._foot, fix.t, kind, has_q, has_alt)
+        taken = take_fix(self._foot, fix.t, kind, has_q, has_alt, fix.strange)
         if taken == TAKEN:
             self._accepted(fix.kind)
             return Verdict.ACCEPTED
@@ -269,24 +275,25 @@ class InertialFilter:
         if float(off @ off) > NOT_OURS**2:
             self.doubt.whose.see(fix.t, fix.kind, point, sigma, self.moves, self.other_moves)
             if self.doubt.is_others(t, point, off, unrest, self.other(fix.kind, fix.t)):
-                settle_fix(self._foot, i, False)
+                settle_fix(self._foot, i, False, False)
                 return Verdict.IDENTITY
         if taken == FAR:
-            settle_fix(self._foot, i, True)
+            settle_fix(self._foot, i, True, fix.strange)
             self._accepted(fix.kind)
             return Verdict.ACCEPTED
         acquired = self.acquired
-        if taken != IMPOSSIBLE:
-            turn = None
-            if row[TURN_SIGMA] > 0.0:
-                turn = float(attitude_error(tuple(row[MEASURED_Q : MEASURED_Q + 4].tolist()), timeline.X[i])[1])
-            rejected = Rejected(t, point, off, turn, math.sqrt(timeline.P[i, 7, 7]), sigma, arm)
+        if taken != IMPOSSIBLE and not (acquired and fix.strange):
+            turn, lean = None, (0.0, 0.0)
+            if row[TURN_SIGMA] != 0.0:
+                error = attitude_error(tuple(row[MEASURED_Q : MEASURED_Q + 4].tolist()), timeline.X[i])
+                turn, lean = float(error[1]) if row[TURN_SIGMA] > 0.0 else None, (float(error[0]), float(error[2]))
+            rejected = Rejected(t, point, off, turn, math.sqrt(timeline.P[i, 7, 7]), sigma, arm, lean)
             known = math.sqrt(max(timeline.P[i].diagonal()[:3])) if acquired else None
             agreed = self.doubt.agreed(rejected, fix.kind, known, unrest)
             if agreed is not None:
                 self._restart_from(agreed, fix)
                 return Verdict.ACCEPTED
-        settle_fix(self._foot, i, False)
+        settle_fix(self._foot, i, False, False)
         return Verdict.GATE if acquired or taken == IMPOSSIBLE else Verdict.UNCONFIRMED
 
     def _restart_from(self, agreed: list[Rejected], fix: OpticalFix) -> None:
@@ -294,7 +301,7 @@ class InertialFilter:
         timeline = self._timeline
         i = timeline.place(agreed[0].t - 1)
         if i == 0:
-            settle_fix(self._foot, 1, False)
+            settle_fix(self._foot, 1, False, False)
             return
         q = timeline.X[i - 1, 6:10]
         toes = None
@@ -304,18 +311,25 @@ class InertialFilter:
             toes = float(rot.yaw_of(fix.head.q) - rot.yaw_of(foot_q))
         self._seen_yaw |= fill_reset(timeline.rows[i], agreed, q, toes)
         chosen = {k.t for k in agreed}
-        for j in range(i, timeline.n):
-            if timeline.rows[j, KIND] == FIX and int(timeline.t[j]) in chosen:
-                timeline.rows[j, ACCEPTED] = 1.0
-        settle_fix(self._foot, i, False)
+        for j in range(i + 1, timeline.n):
+            # What others said meanwhile, and an earlier start from them, is overruled too.
+            if timeline.rows[j, KIND] != IMU:
+                timeline.rows[j, KIND] = FIX
+                timeline.rows[j, ACCEPTED] = PLACES if int(timeline.t[j]) in chosen else 0.0
+                if timeline.rows[i, TILT_SIGMA] > 0.0:
+                    timeline.rows[j, TURN_SIGMA] = abs(timeline.rows[j, TURN_SIGMA])
+        settle_fix(self._foot, i, False, False)
         self.acquired = True
         self._forget_motion()
         self._lock[:] = 0.0
 
     def _jump_to(self, t: int) -> None:
-        """The device's clock was set back: go on from there, unsure."""
-        self._timeline.restart(t - 1)
-        self._foot["newest"], self._foot["last_q"] = t - 1, 0.0
+        """The device's clock was set back: go on from there, unsure; what a device's own attitude says still counts."""
+        before = t - round(JUMP_S * 1e9)
+        self._timeline.restart(before)
+        self._foot["newest"] = before
+        turned = JUMP_TURN_S * float(np.linalg.norm(self._last[GYRO : GYRO + 3]))
+        self._timeline.P[0, range(6, 9), range(6, 9)] += turned**2
         self._timeline.P[0, range(3), range(3)] += 0.1**2
         self._timeline.P[0, range(3, 6), range(3, 6)] += 1.0
         self._stance[:] = 0.0

@@ -50,8 +50,25 @@ GYRO_BIAS_WALK = 0.0001
 """rad/s/sqrt(s): a real one drifts by 0.04 deg/s while its sensor warms up for 10 s."""
 DELAY_WALK = 0.0001
 """s/sqrt(s)."""
+FASTEST, UNKNOWN_SPEED = 20.0, 3.0
+"""m/s: a sprinter's foot; SD of a foot of whose speed nothing is known."""
+LONGEST_DELAY_S = 0.05
 SMALLEST, SMALLEST_OF_GYRO_BIAS = 1e-8, 1e-14
 """Below which no variance falls, in the units of each."""
+
+
+@compiled
+def bound(x: Array, P: Array) -> None:
+    """No foot is faster than FASTEST, and no camera later than LONGEST_DELAY_S: who says so knows nothing of it."""
+    x[16] = min(max(x[16], -LONGEST_DELAY_S), LONGEST_DELAY_S)
+    if x[3] * x[3] + x[4] * x[4] + x[5] * x[5] <= FASTEST**2:
+        return
+    for k in range(3, 6):
+        x[k] = 0.0
+        for j in range(NE):
+            P[k, j] = 0.0
+            P[j, k] = 0.0
+        P[k, k] = UNKNOWN_SPEED**2
 
 
 @compiled

@@ -22,22 +22,24 @@ from foottrack_service.fusion.foot_filter_events import (
     KIND,
     MEASURED_Q,
     PLACED_DELAY,
+    PLACES,
     POINT,
     POINT_COV,
+    TEACHES,
     TURN_SIGMA,
     ZERO_SIGMA,
 )
-from foottrack_service.fusion.foot_filter_kernel import NE, invert3, seen_through
+from foottrack_service.fusion.foot_filter_kernel import LONGEST_DELAY_S, NE, invert3, seen_through
 from foottrack_service.fusion.foot_filter_memory import DEPTH, MARKER, Feet, Foot
+from foottrack_service.fusion.foot_filter_models import attitude_error, point_model, turn_off
 from foottrack_service.fusion.foot_filter_range import SCALE, learn_range
-from foottrack_service.fusion.foot_filter_replay import attitude_error, point_model, replay, turn_off
+from foottrack_service.fusion.foot_filter_replay import replay
 from foottrack_service.fusion.interface import FIX_MEMORY_S, OpticalFix, Verdict
 from foottrack_service.fusion.timeline import place
 from foottrack_service.rotations import Array
 
 UNUSED, STALE, TAKEN, FAR, DOUBTED, IMPOSSIBLE = 0, 1, 2, 3, 4, 5
 """What became of a fix."""
-LONGEST_DELAY_S = 0.05
 UNSURE_SIGMA = 0.3
 """m per axis: who knows the place no better needs fixes that agree."""
 CHI_SQUARE_3 = 16.3
@@ -55,9 +57,9 @@ LEAST_TURN_SIGMA = 0.012
 TURN_PER_METRE = 25.0
 """rad/m: a tag's turn in the picture is known to its corner noise over its size (6 cm)."""
 TILT_USABLE = 0.45
-"""rad: a tag's attitude that leans more against gravity is not used."""
+"""rad, and three sigma of our tilt: a tag's attitude that leans more against gravity is not used."""
 TILT_IMPOSSIBLE = 0.9
-"""rad: and beyond this it is not our tag, wherever it is."""
+"""rad, likewise: and beyond this it is not our tag, wherever it is."""
 BLOB_SIGMA = 0.025
 """m per axis: shoes and views differ."""
 BLOB_WANDER = 0.025
@@ -104,10 +106,11 @@ class Blob:
 
 
 @compiled
-def take_fix(foot: Feet, t: int, kind: int, has_q: bool, has_alt: bool) -> int:
+def take_fix(foot: Feet, t: int, kind: int, has_q: bool, has_alt: bool, strange: bool) -> int:
     """Take the fix of ``t``, ns, that lies in ``p``, ``q``, ``q_alt``, ``cov``, ``head_p`` and ``head_q``.
 
     It is the event ``fix_at`` then, off by ``residual``, and waits for ``settle_fix`` where it is not TAKEN.
+    ``strange``: its stamp may be wrong.
     FAR: good, but so far off that it may be the other foot's. DOUBTED: beyond the gates, or of a foot that does not
     know its place. IMPOSSIBLE: no attitude of the tag can be this foot's.
     """
@@ -124,7 +127,7 @@ def take_fix(foot: Feet, t: int, kind: int, has_q: bool, has_alt: bool) -> int:
     row, x, P = s.rows[i], s.X[i], s.P[i]
     _fill_fix(s, row, kind, delay)
     replay(s, i, i + 1)
-    ours = _take_attitude(s, row, x, has_q, has_alt)
+    ours = _take_attitude(s, row, x, P, has_q, has_alt)
     place_off, turn_off, residual = _judged(row, x, P, _rate(s, i, x))
     if not (P[0, 0] <= UNSURE_SIGMA**2 and P[1, 1] <= UNSURE_SIGMA**2 and P[2, 2] <= UNSURE_SIGMA**2):
         s.acquired = 0
@@ -136,8 +139,8 @@ def take_fix(foot: Feet, t: int, kind: int, has_q: bool, has_alt: bool) -> int:
         return DOUBTED
     if squared(residual[0]) + squared(residual[1]) + squared(residual[2]) > NOT_OURS**2:
         return FAR
-    _accept(s, i)
-    if kind == MARKER:
+    _accept(s, i, strange)
+    if kind == MARKER and not strange:
         s.tag_t = t
         if s.seen_speed == 0.0 and s.last[ZERO_SIGMA] > 0.0:
             learn_range(s, x)
@@ -146,17 +149,17 @@ def take_fix(foot: Feet, t: int, kind: int, has_q: bool, has_alt: bool) -> int:
 
 
 @compiled
-def settle_fix(foot: Feet, i: int, accepted: bool) -> None:
+def settle_fix(foot: Feet, i: int, accepted: bool, strange: bool) -> None:
     """The fix at event i is accepted or not; all events from there on are replayed."""
     s = foot[0]
     if accepted:
-        _accept(s, i)
+        _accept(s, i, strange)
     replay(s, i, s.n)
 
 
 @compiled
-def _accept(s: Foot, i: int) -> None:
-    s.rows[i, ACCEPTED] = 1.0
+def _accept(s: Foot, i: int, strange: bool) -> None:
+    s.rows[i, ACCEPTED] = PLACES if strange else TEACHES
     see(s, s.t[i], vector(s.rows[i], POINT))
     if s.seen_speed > 0.0:
         for j in range(i + 1, s.n):
@@ -187,7 +190,7 @@ def _fill_fix(s: Foot, row: Array, kind: int, delay: float) -> None:
 
 
 @compiled
-def _take_attitude(s: Foot, row: Array, x: Array, has_q: bool, has_alt: bool) -> bool:
+def _take_attitude(s: Foot, row: Array, x: Array, P: Array, has_q: bool, has_alt: bool) -> bool:
     """Let gravity, as the state ``x`` knows it, choose among the tag's attitudes.
 
     False: none of them can be this foot's. One that leans a little too much is just not used.
@@ -205,17 +208,18 @@ def _take_attitude(s: Foot, row: Array, x: Array, has_q: bool, has_alt: bool) ->
                 best, least = seen, lean
     if least == math.inf:
         return True
-    if least > TILT_IMPOSSIBLE:
+    unsure = 3.0 * math.sqrt(P[6, 6] + P[8, 8])
+    if least > TILT_IMPOSSIBLE + unsure:
         return False
-    if least <= TILT_USABLE:
-        q = product(best, to_marker)
-        face = rotation(to_marker)[2]
-        for k in range(4):
-            row[MEASURED_Q + k] = q[k]
-        for k in range(3):
-            row[FACE + k] = face[k]
-        across2 = TURN_PER_METRE * TURN_PER_METRE * max(0.0, _smallest(s.cov[:]))
-        row[TURN_SIGMA] = math.sqrt(LEAST_TURN_SIGMA * LEAST_TURN_SIGMA + across2)
+    q = product(best, to_marker)
+    face = rotation(to_marker)[2]
+    for k in range(4):
+        row[MEASURED_Q + k] = q[k]
+    for k in range(3):
+        row[FACE + k] = face[k]
+    across2 = TURN_PER_METRE * TURN_PER_METRE * max(0.0, _smallest(s.cov[:]))
+    turn_sigma = math.sqrt(LEAST_TURN_SIGMA * LEAST_TURN_SIGMA + across2)
+    row[TURN_SIGMA] = turn_sigma if least <= TILT_USABLE + unsure else -turn_sigma
     return True
 
 

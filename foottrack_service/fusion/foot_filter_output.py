@@ -44,6 +44,9 @@ BALL_RISE = 0.012
 """m."""
 FASTEST_FOLLOW_S, SLOWEST_FOLLOW_S = 0.1, 1.0
 """How fast the lock follows the filter: landing is corrected soon, a foot that has stood for long hardly moves."""
+NEAR_HOLD = 0.004
+"""m: by so much corrections of a standing foot may be off and are followed slowly; the further off, the sooner: a foot
+that was led astray stood 2 cm beside itself for a second after its filter was right again."""
 LARGEST_HOLD = 0.02
 """m: who disagrees by more is not held."""
 RELEASE_S = 0.017
@@ -80,7 +83,11 @@ def follow(s: Foot, dt: float) -> None:
         lock[LOCKED] = 1.0
         lock[SINCE] = 0.0
     lock[SINCE] += dt
-    share = min(1.0, dt / min(max(lock[SINCE], FASTEST_FOLLOW_S), SLOWEST_FOLLOW_S))
+    gap2 = 0.0
+    for k in range(3):
+        gap2 += squared(ball[k] - lock[HELD + k])
+    slowest = SLOWEST_FOLLOW_S * min(1.0, NEAR_HOLD**2 / max(gap2, 1e-12))
+    share = min(1.0, dt / max(min(lock[SINCE], slowest), FASTEST_FOLLOW_S))
     for k in range(3):
         lock[HELD + k] += share * (ball[k] - lock[HELD + k])
         lock[OFFSET + k] = lock[HELD + k] - ball[k]

@@ -11,12 +11,8 @@ import numpy as np
 
 from foottrack_service.compiled import compiled
 from foottrack_service.fusion.compiled_rotations import (
-    Quaternion,
     Vector,
-    conjugate,
     cross,
-    logarithm,
-    product,
     quaternion,
     rotation,
     squared,
@@ -29,16 +25,13 @@ from foottrack_service.fusion.foot_filter_events import (
     ACCEPTED,
     ARM,
     CLIPPED,
-    FACE,
     FLOOR,
     GYRO,
     IMU,
     KIND,
     MEAN_RATE,
     MEASURED_Q,
-    PLACED_DELAY,
     POINT,
-    POINT_COV,
     POINT_SIGMA,
     RESET,
     REST_RATE,
@@ -58,15 +51,19 @@ from foottrack_service.fusion.foot_filter_kernel import (
     GRAVITY,
     NE,
     NX,
+    bound,
     floor_covariance,
     propagate,
     update1,
-    update3,
     update_speed,
 )
 from foottrack_service.fusion.foot_filter_memory import Foot
+from foottrack_service.fusion.foot_filter_models import fix_updates
 from foottrack_service.rotations import Array
 
+GAP_S, GAP_SHARE = 0.045, 0.5
+"""Between two samples that are further apart a share of the turn is a guess, or the clock was put forward and there was
+none."""
 HOLE_S = 0.1
 """A longer silence of the IMU is not integrated across."""
 HOLE_SPEED = 1.5
@@ -118,63 +115,10 @@ def replay(s: Foot, start: int, end: int) -> None:
             _inertial_updates(s, row, x, P, min(dt, HOLE_S))
         elif row[KIND] == RESET:
             _reset(row, x, P)
-        elif row[ACCEPTED] == 1.0:
+        elif row[ACCEPTED] > 0.0:
             fix_updates(row, x, P, _rate(rows, x, i, end))
+        bound(x, P)
         floor_covariance(P)
-
-
-@compiled
-def point_model(x: Array, arm: Vector, rate: Vector, delay: float, h: Array, H: Array) -> None:
-    """A point of the foot at ``arm``, sensor frame, m: its place into h (3,), the Jacobian into H (3, 16).
-
-    ``rate`` is the sensor's turning, rad/s; ``delay`` how much later than the state the point was seen, s.
-    """
-    R = rotation(quaternion(x, 6))
-    r = turned(R, arm)
-    s = turned(R, cross(rate, arm))
-    H[:] = 0.0
-    for i in range(3):
-        speed = x[3 + i] + s[i]
-        h[i] = x[i] + r[i] + speed * delay
-        H[i, i] = 1.0
-        H[i, 3 + i] = delay
-        H[i, 15] = speed
-    H[0, 7], H[0, 8] = r[2], -r[1]
-    H[1, 6], H[1, 8] = -r[2], r[0]
-    H[2, 6], H[2, 7] = r[1], -r[0]
-
-
-@compiled
-def attitude_error(q: Quaternion, x: Array) -> Vector:
-    """The small turn in the stage from the state's attitude to q, rotation vector, rad."""
-    return logarithm(product(q, conjugate(quaternion(x, 6))))
-
-
-@compiled
-def turn_off(row: Array, x: Array) -> tuple[Vector, float]:
-    """The tag's normal in the stage by the state, and the turn about it from the state's attitude to the seen one, rad.
-
-    The seen normal is off by degrees, another way in each picture: taken for the axis, it makes every picture of a foot
-    that stands tell a bit of its tilt, and a second of them what nobody can know.
-    """
-    normal = turned(rotation(quaternion(x, 6)), vector(row, FACE))
-    error = attitude_error(quaternion(row, MEASURED_Q), x)
-    return normal, normal[0] * error[0] + normal[1] * error[1] + normal[2] * error[2]
-
-
-@compiled
-def fix_updates(row: Array, x: Array, P: Array, rate: Vector) -> None:
-    """An accepted fix: the target's place and, where it has one, its turn about the target's face."""
-    h, H = np.empty(3), np.empty((3, NE))
-    point_model(x, vector(row, ARM), rate, x[16] - row[PLACED_DELAY], h, H)
-    noise = row[POINT_COV : POINT_COV + 9].reshape(3, 3)
-    update3(x, P, H, (row[POINT] - h[0], row[POINT + 1] - h[1], row[POINT + 2] - h[2]), noise, np.inf)
-    if row[TURN_SIGMA] > 0.0:
-        normal, innovation = turn_off(row, x)
-        H1 = np.zeros(NE)
-        for i in range(3):
-            H1[6 + i] = normal[i]
-        update1(x, P, H1, innovation, squared(row[TURN_SIGMA]), np.inf)
 
 
 @compiled
@@ -219,8 +163,18 @@ def _advance(t: Stamps, rows: Array, x: Array, P: Array, i: int, end: int, dt: f
     if (t[after] - t[before]) * 1e-9 <= HOLE_S and dt <= HOLE_S:
         clipped = rows[before, CLIPPED] == 1.0 or rows[after, CLIPPED] == 1.0
         propagate(x, P, acc, gyro, math.sqrt(step), clipped, rows[after, WANDER], dt)
+        gap = (t[after] - t[before]) * 1e-9
+        if gap > GAP_S:
+            w2 = max(_square(vector(rows[before], GYRO)), _square(vector(rows[after], GYRO)))
+            for k in range(6, 9):
+                P[k, k] += w2 * GAP_SHARE**2 * gap * dt
     else:
         _coast(x, P, gyro, fused, dt)
+
+
+@compiled
+def _square(a: Vector) -> float:
+    return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
 
 
 @compiled

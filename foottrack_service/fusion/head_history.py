@@ -17,12 +17,20 @@ MAX_SPAN_S = 0.1
 """Tracked poses further apart are a hole, and nothing is made up within it."""
 HORIZON_S = 1.5
 """What is kept: more than any camera is late."""
+SET_BACK_S = 0.03
+"""A pose that is so much older than the newest, though it arrives after it, shows that the clock was set back."""
 
 
 class HeadHistory:
-    """The last poses of a head, in the order of their stamps, however they arrived."""
+    """The last poses of a head, in the order of their stamps: one or two may arrive out of turn.
+
+    Poses of a clock that was set back replace those that it had stamped later: among each other, a head that walks
+    would be in two places in turn.
+    """
 
     def __init__(self) -> None:
+        self.strange = False
+        """Whether the last poses' age is not what it usually is, as if the clock had jumped."""
         self._stamps: list[int] = []
         self._samples: list[HeadSample | None] = []
 
@@ -66,15 +74,15 @@ class HeadHistory:
         self._samples.clear()
 
     def _insert(self, t: int, sample: HeadSample | None) -> None:
-        horizon = int(HORIZON_S * 1e9)
-        if self._stamps and t < self._stamps[-1] - horizon:
-            self.clear()  # the clock jumped back: what is stamped ahead would stay the newest for ever
         place = bisect_left(self._stamps, t)
+        if self._stamps and t < self._stamps[-1] - SET_BACK_S * 1e9:
+            del self._stamps[place:]
+            del self._samples[place:]
         if place < len(self._stamps) and self._stamps[place] == t:
             self._samples[place] = sample
         else:
             self._stamps.insert(place, t)
             self._samples.insert(place, sample)
-        old = bisect_right(self._stamps, self._stamps[-1] - horizon)
+        old = bisect_right(self._stamps, self._stamps[-1] - int(HORIZON_S * 1e9))
         del self._stamps[:old]
         del self._samples[:old]

@@ -84,6 +84,8 @@ class OpticalFix:
     """Interpolated at ``t``."""
     head_at_arrival: HeadSample
     """The newest there was when the fix arrived: what the reference filter uses."""
+    strange: bool = False
+    """The picture's or the head's age is not what it usually is, as if a clock had jumped."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,10 @@ from foottrack_service.fusion.mount_calibration import MountCalibrator
 
 PERIOD_S = 5.0
 """Between two publications."""
+HELD_S = 0.5
+"""So long a fix waits, and so long after several that were not believed none counts."""
+SEVERAL, TOGETHER_S = 4, 0.3
+"""Single false tags say nothing of the others; this many in so short a time do."""
 KEPT = 128
 """So many of our own results are known again when they come back."""
 
@@ -32,11 +36,20 @@ class MountWatch:
         """Somebody knows better: what was seen so far may have been with another mount."""
         self._calibrator = MountCalibrator(known if known is not None and known.base == self._base else None)
         self._said.clear()
+        self._held: deque[tuple[Side, OpticalFix, bool]] = deque(maxlen=256)
+        self._doubts: deque[int] = deque(maxlen=SEVERAL)
+        self._doubted: int | None = None
         self._slips = 0
 
     def add(self, side: Side, fix: OpticalFix, standing: bool) -> None:
-        """A fix that the filter believed, as the *configured* mount gave it, and whether its foot stands."""
-        self._calibrator.add(side, fix, standing)
+        """A fix that the filter believed, as the *configured* mount gave it, and whether its foot stands.
+
+        It counts HELD_S later: by then its neighbours have shown whether the sensors were well.
+        """
+        if self._doubted is None or abs(fix.t - self._doubted) > HELD_S * 1e9:
+            self._held.append((side, fix, standing))
+        while self._held and abs(fix.t - self._held[0][1].t) > HELD_S * 1e9:
+            self._calibrator.add(*self._held.popleft())
         if self._calibrator.slips > self._slips:
             self._slips = self._calibrator.slips
             self.slips, self._found_since = self.slips + 1, 0
@@ -45,8 +58,16 @@ class MountWatch:
                 "the background; look at your feet for a while, or run: foottrack calibrate mount"
             )
 
+    def doubt(self, t: int) -> None:
+        """A fix of ``t``, ns, was not believed. Where several are not, the others about then may be as wrong."""
+        self._doubts.append(t)
+        if len(self._doubts) == SEVERAL and abs(t - self._doubts[0]) <= TOGETHER_S * 1e9:
+            self._held.clear()
+            self._doubted = t
+
     def recentred(self) -> None:
         """The stage moved."""
+        self._held.clear()
         self._calibrator.recentred()
 
     def said(self, values: MountValues) -> bool:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from foottrack_service import rotations as rot
 from foottrack_service.fusion.compiled_rotations import rotation
 from foottrack_service.fusion.foot_filter_kernel import NE, NX, inject, propagate, update1, update3
-from foottrack_service.fusion.foot_filter_replay import attitude_error, point_model
+from foottrack_service.fusion.foot_filter_models import attitude_error, point_model
 from foottrack_service.rotations import Array
 
 seeds = st.integers(0, 10**6)
