@@ -21,6 +21,16 @@ def gauss_markov(random: np.random.Generator, count: int, step: float, tau: floa
     return walk * sd
 
 
+def smooth_gauss_markov(
+    random: np.random.Generator, count: int, step: float, tau: float, smooth_tau: float, sd: float
+) -> Array:
+    """As ``gauss_markov``, through a first-order low-pass of `smooth_tau` s, with the same standard deviation."""
+    rough = gauss_markov(random, count, step, tau, sd * np.sqrt(1.0 + smooth_tau / tau))
+    keep = np.exp(-step / smooth_tau)
+    smooth: Array = lfilter([1.0 - keep], [1.0, -keep], rough, axis=0, zi=keep * rough[:1])[0]
+    return smooth
+
+
 def wander(random: np.random.Generator, count: int, rate: float, band_hz: float, sd: Array | float) -> Array:
     """Smooth random motion below `band_hz` with standard deviation `sd` (scalar or (3,)); (count, 3) at `rate` Hz."""
     # Drawn slowly and then interpolated: filtering far below the sampling rate is ill-conditioned.

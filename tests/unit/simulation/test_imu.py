@@ -167,6 +167,13 @@ def test_random_processes_have_the_stated_spread() -> None:
     np.testing.assert_allclose(walk.std(axis=0), [1.0, 2.0, 0.5], rtol=0.06)
     lag = np.sum(walk[:-100] * walk[100:], axis=0) / np.sum(walk**2, axis=0)
     np.testing.assert_allclose(lag, np.exp(-1.0), atol=0.06)
+    slow = noise.smooth_gauss_markov(random(), 400_000, 0.01, 2.0, 0.1, 1.4)
+    assert slow.std() == pytest.approx(1.4, rel=0.05)
+    for steps, tau_s in ((1, 0.01), (30, 0.3)):
+        # Correlation of two first-order low-passes in a row: (2 e^(-t/2) - 0.1 e^(-t/0.1)) / 1.9.
+        kept = (2.0 * np.exp(-tau_s / 2.0) - 0.1 * np.exp(-tau_s / 0.1)) / 1.9
+        changed = np.sqrt(np.mean((slow[steps:] - slow[:-steps]) ** 2))
+        assert changed == pytest.approx(1.4 * np.sqrt(2.0 - 2.0 * kept), rel=0.08)
     smooth = noise.wander(random(), 100_000, 100.0, 1.0, 0.3)
     np.testing.assert_allclose(smooth.std(axis=0), 0.3, rtol=0.1)
     spectrum = np.abs(np.fft.rfft(smooth[:, 0])) ** 2
