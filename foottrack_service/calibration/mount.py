@@ -26,7 +26,7 @@ class MountFlow(Flow):
     def __init__(self, settings: Settings) -> None:
         super().__init__()
         self._base = settings.camera.mount_hash
-        self._sight, self._calibrator = Sight(), MountCalibrator()
+        self._sight, self._calibrator = Sight(), MountCalibrator(settings.camera.mount)
         self._stands: dict[Side, bool] = {"left": True, "right": True}
         self._fixes = self._standing = 0
         self.progress = Progress(0.0, _DO)

@@ -69,7 +69,7 @@ class FusionCore:
         self._origin: int | None = None
         self._calibrated: dict[tuple[str, Side | None], Any] = {}
         watched = settings.fusion.mount_calibration and settings.fusion.filter == "error-state"
-        self._watch = MountWatch(settings.camera.mount_hash) if watched else None
+        self._watch = MountWatch(settings.camera) if watched else None
         self._feet: dict[Side, Foot] = {side: Foot(settings, side, self._heads, self._watch, make) for side in SIDES}
         self._feet["left"].beside(self._feet["right"])
         self._feet["right"].beside(self._feet["left"])

@@ -14,7 +14,7 @@ import numpy as np
 from foottrack_protocol.messages import Side
 from foottrack_service import rotations as rot
 from foottrack_service.compiled import is_compiled
-from foottrack_service.config import FootSettings, Placement
+from foottrack_service.config import CameraSettings, FootSettings, Placement
 from foottrack_service.fusion.foot_filter_inertial import InertialFilter
 from foottrack_service.fusion.foot_filter_sample import take_sample
 from foottrack_service.fusion.interface import (
@@ -146,7 +146,7 @@ def warm_up() -> None:
     """Compile the kernels, or read them from the cache, before the first sample needs them, and say so."""
     if not is_compiled(take_sample):
         _log.info("compiling the foot filter for this machine: about half a minute, this once")
-    trial, mount = ErrorStateFilter(FootSettings(), "left"), MountCalibrator()
+    trial, mount = ErrorStateFilter(FootSettings(), "left"), MountCalibrator(CameraSettings().mount)
     step = 5_000_000
     for i in range(40):
         trial.on_imu(ImuSample(i * step, np.array([0.0, 9.80665, 0.0]), np.zeros(3), None))

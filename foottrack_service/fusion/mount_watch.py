@@ -7,6 +7,7 @@ import math
 from collections import deque
 
 from foottrack_protocol.messages import FilterHealth, MountCalibration, MountValues, Side
+from foottrack_service.config import CameraSettings
 from foottrack_service.fusion.interface import OpticalFix
 from foottrack_service.fusion.mount_calibration import MountCalibrator
 
@@ -23,10 +24,10 @@ _log = logging.getLogger(__name__)
 
 
 class MountWatch:
-    """Collects fixes of standing feet; its result is for the mount that is configured, named by ``base``."""
+    """Collects fixes of standing feet; its result is for the mount that is configured."""
 
-    def __init__(self, base: str) -> None:
-        self._base = base
+    def __init__(self, camera: CameraSettings) -> None:
+        self._camera, self._base = camera.mount, camera.mount_hash
         self._due: int | None = None
         self._said: deque[MountValues] = deque(maxlen=KEPT)
         self.slips = self._found_since = 0
@@ -34,7 +35,8 @@ class MountWatch:
 
     def restart(self, known: MountValues | None = None) -> None:
         """Somebody knows better: what was seen so far may have been with another mount."""
-        self._calibrator = MountCalibrator(known if known is not None and known.base == self._base else None)
+        ours = known is not None and known.base == self._base
+        self._calibrator = MountCalibrator(self._camera, known if ours else None)
         self._said.clear()
         self._held: deque[tuple[Side, OpticalFix, bool]] = deque(maxlen=256)
         self._doubts: deque[int] = deque(maxlen=SEVERAL)
