@@ -14,7 +14,7 @@ from foottrack_service.fusion.foot_filter_replay import FLOOR_LEAN, FLOOR_SIGMA
 from foottrack_service.rotations import Array
 
 SCALE_SIGMA = 0.005
-"""How wrong depth scales are, SD (mount_calibration has the same)."""
+"""How wrong depth scales are, SD (mount_filter has the same)."""
 PICTURE_SIGMA = 0.005
 """What one picture adds to that, SD: its noise and its share of what neighbours have in common."""
 PICTURES = 1200.0
