@@ -9,7 +9,7 @@ import numpy as np
 from foottrack_service import rotations as rot
 from foottrack_service.compiled import compiled
 from foottrack_service.fusion.compiled_rotations import conjugate, logarithm, product, quaternion, rotation, squared
-from foottrack_service.fusion.contact import rest, stance_sigma
+from foottrack_service.fusion.contact import SEEN_SPAN_NS, rest, stance_sigma
 from foottrack_service.fusion.foot_filter_events import (
     ACC,
     CLIPPED,
@@ -91,6 +91,9 @@ def take_sample(foot: Feet, t: int, has_gyro: bool, has_q: bool) -> int:
     row = s.rows[i]
     _fill_sample(s, row, has_gyro, has_q, dt)
     s.newest = t
+    if s.seen > 0 and t - s.seen_t[s.seen - 1] > SEEN_SPAN_NS:
+        # What a foot did when it was last seen says nothing of its next stances in the dark.
+        s.seen, s.seen_speed = 0, 0.0
     if not first:
         sigma = stance_sigma(s.t[:], s.rows[:], i, dt, s.X[i - 1], s.P[i - 1], s.stance[:])
         if sigma > 0.0:
