@@ -7,9 +7,7 @@ hears how it goes.
 
 from __future__ import annotations
 
-import os
 import signal
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -29,6 +27,7 @@ from foottrack_service.camera import overlay, raw
 from foottrack_service.camera.frame import Frame, Source, SourceEnded, SourceError
 from foottrack_service.camera.marker_tracker import warm_up
 from foottrack_service.camera.setup import Trackers, open_source
+from foottrack_service.camera.shifts import in_shifts
 from foottrack_service.config import Settings
 
 SOURCE = "camera"
@@ -171,7 +170,6 @@ def work(connection: Connection, settings: dict[str, Any]) -> None:
     """
     # Ctrl-C reaches every process of the terminal; the node says when it is time.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _yield_to_others()
     # Pictures come one by one: OpenCV's threads would only take the other core from fusion.
     cv2.setNumThreads(1)
     error: str | None = None
@@ -203,26 +201,20 @@ def _watch(connection: Connection, settings: Settings, source: Source, speaker: 
     trackers = Trackers(settings.camera, source.intrinsics)
     watcher = Watcher(trackers, settings.camera.source.preview, time.perf_counter_ns)
     connection.send(Opened())
-    told = time.perf_counter()
-    try:
-        while not connection.poll() or connection.recv() != STOP:
-            frame = source.read()
-            speaker.say(watcher.report(frame))
-            if speaker.wants_pictures:
-                # After the fixes, which are waited for.
-                speaker.show(frame.t, watcher.picture(frame))
-            if time.perf_counter() - told > TALLY_PERIOD_S:
-                told = time.perf_counter()
-                connection.send(speaker.tally())
-    finally:
-        connection.send(speaker.tally())
 
+    def pictures(over: Callable[[], bool]) -> None:
+        told = time.perf_counter()
+        try:
+            while not over():
+                frame = source.read()
+                speaker.say(watcher.report(frame))
+                if speaker.wants_pictures:
+                    # After the fixes, which are waited for.
+                    speaker.show(frame.t, watcher.picture(frame))
+                if time.perf_counter() - told > TALLY_PERIOD_S:
+                    told = time.perf_counter()
+                    connection.send(speaker.tally())
+        finally:
+            connection.send(speaker.tally())
 
-def _yield_to_others() -> None:
-    """A picture may wait, an IMU's sample may not: when a picture comes, whoever runs goes on (half as long a wait).
-
-    No lower priority than others: beside a game that takes all cores the tags would be lost.
-    """
-    if sys.platform == "linux":
-        with suppress(OSError):
-            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    in_shifts(pictures, lambda timeout: connection.poll(timeout) and connection.recv() == STOP)
