@@ -59,7 +59,7 @@ FULL_EFFORT = 3.0
 """m/s^2 beyond gravity at which all of that is there."""
 EFFORT_MEMORY_S = 2.0
 """A device that was moved levels itself again afterwards: its tilt goes on wandering in the stance."""
-ACC_BIAS = 0.15
+ACC_BIAS = 0.2
 """m/s^2 per axis: data sheets allow 0.17 to 0.2. Who believes less never learns it, and loses
 centimetres in a swing."""
 _UP = np.array([0.0, 1.0, 0.0])
