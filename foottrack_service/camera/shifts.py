@@ -17,9 +17,9 @@ from pathlib import Path
 PERIOD_S = 0.25
 """Between two looks at the cores."""
 FEW_CORES, ENOUGH_CORES = 0.3, 0.6
-"""Free ones, of which pictures take up to a quarter: with fewer nobody gives way, until there have been enough again
-for ..."""
+"""Free ones, of which pictures take up to a quarter: with fewer than the first nobody gives way."""
 ENOUGH_FOR_S = 10.0
+"""Who does not give way any more does again when the second were free for so long: a game's load comes and goes."""
 
 
 class Manners:

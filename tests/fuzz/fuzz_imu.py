@@ -1,6 +1,6 @@
 """Coverage-guided fuzzing of the IMU decoders: ``python tests/fuzz/fuzz_imu.py -max_total_time=600 [CORPUS]``.
 
-The last long run, ten minutes from an empty corpus and 627,546 inputs (22 November 2026), broke no promise.
+The last long run, seven minutes from an empty corpus and 627,546 inputs (22 November 2026), broke no promise.
 Needs ``atheris``. ``test_fuzz_imu.py`` runs the same checks on a fixed corpus in every test run.
 """
 
