@@ -18,7 +18,7 @@ from rich.table import Table
 from foottrack_protocol import Message, encode
 from foottrack_protocol.frames import STANDARD_GRAVITY
 from foottrack_protocol.messages import HeadPose, Imu
-from foottrack_service.cli.running import CommandFailed, JsonOption, print_json, run_loop
+from foottrack_service.cli.running import CommandFailed, JsonOption, collect_seldom, print_json, run_loop
 from foottrack_service.config import BusSettings, Settings
 
 _PACE_S = 1 / 200
@@ -92,6 +92,7 @@ def bench(
 
 
 def _serve(pipe: Connection) -> None:
+    collect_seldom()
     try:
         run_loop(_run_service(pipe))
     except KeyboardInterrupt:

@@ -22,7 +22,7 @@ import zmq
 
 from foottrack_protocol import Message, decode, encode
 from foottrack_protocol.messages import HeadPose, Imu
-from foottrack_service.cli.running import CommandFailed, run_loop
+from foottrack_service.cli.running import CommandFailed, collect_seldom, run_loop
 from foottrack_service.config import BusSettings, Settings
 
 PAIRS = 8
@@ -216,6 +216,7 @@ def _draw(folder: Path) -> None:
 
 
 def _serve(pipe: Connection, folder: str, port: str) -> None:
+    collect_seldom()
     try:
         run_loop(_run_service(pipe, folder, port))
     except KeyboardInterrupt:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import io
 import sys
 from typing import Annotated
@@ -75,10 +74,7 @@ def common(
 
 def main() -> None:
     """Entry point: errors that a person can mend are one line and an exit code, not a traceback."""
-    # Messages are many small objects without cycles: looking for some after every 700 of them costs a replay 7 % and a
-    # live pose its p99.
-    gc.freeze()
-    gc.set_threshold(50_000, 20, 50)
+    running.collect_seldom()
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Windows' code pages lack letters of units and names, and a file's name may be no text at all.
         sys.stdout.reconfigure(errors="backslashreplace")

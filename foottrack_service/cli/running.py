@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import json
 import logging
 import signal
@@ -70,6 +71,16 @@ def run_loop(work: Coroutine[Any, Any, T]) -> T:
     """
     with asyncio.Runner(loop_factory=asyncio.SelectorEventLoop) as runner:
         return runner.run(_until_told(work))
+
+
+def collect_seldom() -> None:
+    """For this process, from its beginning: cycles among objects are looked for seldom.
+
+    Messages are many small objects without cycles: looking for some after every 700 of them costs a replay 7 % and a
+    live pose its p99.
+    """
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 50)
 
 
 def print_json(values: Any) -> None:

@@ -33,7 +33,7 @@ from foottrack_service.fusion.filters import MakeFilter, make_filter
 from foottrack_service.fusion.foot import Foot
 from foottrack_service.fusion.gait_link import GaitLink
 from foottrack_service.fusion.head_history import HeadHistory
-from foottrack_service.fusion.interface import FootEstimate, HeadSample
+from foottrack_service.fusion.interface import FootEstimate, HeadSample, Kind
 from foottrack_service.fusion.mount_watch import MountWatch
 from foottrack_service.fusion.punctuality import Punctuality
 from foottrack_service.rotations import Array
@@ -41,6 +41,8 @@ from foottrack_service.rotations import Array
 SOURCE = "fusion"
 _MOST_DISTANCE = 1000.0
 """m: a head further from the stage's origin is no pose."""
+_PAUSE_NS = 3_000_000
+"""What fusing a picture's two fixes may take, on a core that was asleep (measured: 1 ms)."""
 _AHEAD_NS = 100_000_000
 """What is stamped by so much later than it arrives comes from a clock that is wrong. (A clock over the network is known
 to a few ms, and a runtime may predict its poses to the next frame or two.)"""
@@ -77,6 +79,7 @@ class FusionCore:
         self._shortest_ns = round(1e9 / settings.fusion.max_output_hz)
         self._silence_ns = round(settings.fusion.silence * 1e9)
         self._last_output: int | None = None
+        self._due: dict[Side, int | None] = {}
         self._started = False
         self._seq: dict[str, int] = {}
 
@@ -111,11 +114,9 @@ class FusionCore:
             if side and kind in ("marker", "depth"):
                 self._feet[side].reject("invalid")
         elif kind == "marker" and side:
-            self._feet[side].on_optical("marker", message.t, message.data, now)
-            self._started = True
+            self._on_optical(side, "marker", message, now)
         elif kind == "depth" and side:
-            self._feet[side].on_optical("depth", message.t, message.data, now)
-            self._started = True
+            self._on_optical(side, "depth", message, now)
         elif message.stream == "head/pose":
             self._on_head(message.t, message.data, now)
         elif message.stream == "calibration" and (message.src != SOURCE or self._watch is None):
@@ -128,17 +129,39 @@ class FusionCore:
     def tick(self, now: int) -> list[Message]:
         """The timer: publishes when nothing has been published for 20 ms."""
         deadline = self.deadline
-        return self._publish(now) if deadline is not None and now >= deadline else []
+        if deadline is None or now < deadline:
+            return []
+        self._fuse_pictures(now)
+        return self._publish(now)
 
     def _on_imu(self, side: Side, message: Message, now: int) -> list[Message]:
         if not message.valid:
             self._feet[side].reject("invalid")
             return []
+        previous = self._feet[side].imu_t
         self._feet[side].on_imu(message.t, message.data)
         self._started = True
-        if self._last_output is not None and now - self._last_output < self._shortest_ns:
-            return []
-        return self._publish(now)
+        limited = self._last_output is not None and now - self._last_output < self._shortest_ns
+        results = [] if limited else self._publish(now)
+        self._fuse_pictures(now)
+        period = 0 if previous is None else message.t - previous
+        self._due[side] = now + period if 0 < period <= self._silence_ns else None
+        return results
+
+    def _on_optical(self, side: Side, kind: Kind, message: Message, now: int) -> None:
+        self._feet[side].on_optical(kind, message.t, message.data, now)
+        self._started = True
+        self._fuse_pictures_in_a_pause(now)
+
+    def _fuse_pictures(self, now: int) -> None:
+        for foot in self._feet.values():
+            foot.settle(now)
+
+    def _fuse_pictures_in_a_pause(self, now: int) -> None:
+        """A sample is owed its pose at once, a picture is some 40 ms old anyway: what would be in a sample's way waits
+        until after it. One that is late may be lost, and is waited for only so long."""
+        if not any(due is not None and -self._silence_ns < due - now < _PAUSE_NS for due in self._due.values()):
+            self._fuse_pictures(now)
 
     def _on_head(self, t: int, body: HeadPose, now: int) -> None:
         if self._origin is not None and body.origin != self._origin:
@@ -162,8 +185,7 @@ class FusionCore:
         else:
             self._heads.add(HeadSample(t, np.array(body.p), np.array(body.q)))
             self._started = True
-        for foot in self._feet.values():
-            foot.settle(now)
+        self._fuse_pictures_in_a_pause(now)
 
     def _on_calibration(self, found: Any) -> None:
         # Every calibration comes again every 5 s, and a filter that is placed anew has to find its foot again. Only one
@@ -198,7 +220,6 @@ class FusionCore:
         self._last_output = now
         feet: dict[Side, FootEstimate] = {}
         for side, foot in self._feet.items():
-            foot.settle(now)
             found = foot.estimate(now)
             if found is not None:
                 feet[side] = found

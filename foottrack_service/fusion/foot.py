@@ -105,7 +105,7 @@ class Foot:
         self.imu_t = t
 
     def on_optical(self, kind: Kind, t: int, body: Optical, now: int) -> None:
-        """A camera's fix made at ``t``, arriving at ``now`` (ns). It may have to wait for the head pose around it."""
+        """A camera's fix made at ``t``, arriving at ``now`` (ns). It waits for ``settle`` and its head pose."""
         if math.dist(body.p, (0.0, 0.0, 0.0)) > MOST_DISTANCE or max(map(abs, body.cov)) > MOST_VARIANCE:
             self.reject("implausible")
         elif self._punctual[kind].is_out_of_turn(t, now):
@@ -117,7 +117,6 @@ class Foot:
             if len(self._waiting) == self._waiting.maxlen:
                 self.reject(Verdict.NO_HEAD_POSE)
             self._waiting.append(_Waiting(kind, t, now, body, strange))
-            self.settle(now)
 
     def settle(self, now: int) -> None:
         """Hand the waiting fixes whose head pose is known by now to the filter, in order."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import uuid
 
 from foottrack_protocol import Message
@@ -24,6 +25,8 @@ async def run(bus: Bus, settings: Settings) -> None:
     if settings.fusion.filter == "error-state":
         # Beside the loop: what is held up here, serial bytes for one, would be stamped late.
         await asyncio.to_thread(warm_up)
+    # What is loaded by now stays. Looking through it for garbage held a pose up for 115 ms.
+    gc.freeze()
     publisher = bus.publisher(SOURCE)
     subscriber = bus.subscriber(
         [f"{settings.user}/{topic.stream}" for topic in TOPICS.values() if topic.role in _INPUTS]

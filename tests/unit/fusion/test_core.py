@@ -141,6 +141,31 @@ def test_a_known_recentring_moves_everything_rigidly():
     assert np.allclose(after.data.left.ankle.p, expected, atol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("arrives_ms", "counts_in"),
+    [(21, ["marker", "marker"]), (28, ["lost", "marker"])],
+    ids=["time before the next sample", "in the next sample's way"],
+)
+def test_a_picture_is_never_in_the_way_of_a_samples_pose(arrives_ms, counts_in):
+    core = FusionCore(AT_ONCE)
+    feed(core, [head(0), imu(0), imu(10 * MS), imu(20 * MS), head(21 * MS)])
+    fix = marker(15 * MS, (-0.1, -1.5, -0.15))
+    assert core.handle(fix, arrives_ms * MS) == []
+    assert core.health["user/left"].accepted.get("marker", 0) == (counts_in[0] == "marker")
+    poses = feed(core, [imu(30 * MS), imu(40 * MS)])
+    assert [pose.data.left.stage for pose in poses] == counts_in
+
+
+def test_a_picture_does_not_wait_for_a_sample_that_is_lost():
+    core = FusionCore(AT_ONCE)
+    feed(core, [head(0), imu(0), imu(10 * MS), head(16 * MS)])
+    core.handle(marker(15 * MS, (-0.1, -1.5, -0.15)), 18 * MS)
+    (pose,) = tick(core, core.deadline)
+    assert (pose.t, pose.data.left.stage) == (30 * MS, "marker")
+    core.handle(marker(16 * MS, (-0.1, -1.5, -0.15)), 41 * MS)
+    assert core.health["user/left"].accepted["marker"] == 2
+
+
 def test_an_unknown_recentring_begins_again_and_never_drifts_across():
     core = FusionCore(AT_ONCE)
     feed(core, [head(0), marker(0, (-0.1, -1.5, -0.15)), head(2 * MS, p=(5.0, 1.6, 5.0), origin=1)])
