@@ -183,14 +183,21 @@ def update3(x: Array, P: Array, H: Array, innovation: Vector, noise: Array, gate
 def update_speed(x: Array, P: Array, speed: Vector, variance: float, gate: float) -> float:
     """The velocity is ``speed``, m/s, stage, with this variance per axis, (m/s)^2; else as ``update3``."""
     PH = P[3:6].copy()
-    return _fuse3(x, P, PH, _speed_covariance(P, variance), _faster(x, speed), gate)
+    return _fuse3(x, P, PH, _covariance(P, 3, variance), _off(x, 3, speed), gate)
+
+
+@compiled
+def update_gyro_bias(x: Array, P: Array, bias: Vector, variance: float, gate: float) -> float:
+    """The gyro's bias is ``bias``, rad/s, sensor frame, with this variance per axis, (rad/s)^2; else as ``update3``."""
+    PH = P[12:15].copy()
+    return _fuse3(x, P, PH, _covariance(P, 12, variance), _off(x, 13, bias), gate)
 
 
 @compiled
 def speed_distance(x: Array, P: Array, speed: Vector, variance: float) -> float:
     """Squared Mahalanobis distance of the velocity from ``speed``, as ``update_speed`` has it; inf without one."""
-    found, inverse = invert3(_speed_covariance(P, variance))
-    off = _faster(x, speed)
+    found, inverse = invert3(_covariance(P, 3, variance))
+    off = _off(x, 3, speed)
     y = turned(inverse, off)
     return off[0] * y[0] + off[1] * y[1] + off[2] * y[2] if found else math.inf
 
@@ -233,17 +240,17 @@ def floor_covariance(P: Array) -> None:
 
 
 @compiled
-def _speed_covariance(P: Array, variance: float) -> Matrix:
+def _covariance(P: Array, i: int, variance: float) -> Matrix:
     return (
-        (P[3, 3] + variance, P[3, 4], P[3, 5]),
-        (P[4, 3], P[4, 4] + variance, P[4, 5]),
-        (P[5, 3], P[5, 4], P[5, 5] + variance),
+        (P[i, i] + variance, P[i, i + 1], P[i, i + 2]),
+        (P[i + 1, i], P[i + 1, i + 1] + variance, P[i + 1, i + 2]),
+        (P[i + 2, i], P[i + 2, i + 1], P[i + 2, i + 2] + variance),
     )
 
 
 @compiled
-def _faster(x: Array, speed: Vector) -> Vector:
-    return speed[0] - x[3], speed[1] - x[4], speed[2] - x[5]
+def _off(x: Array, i: int, measured: Vector) -> Vector:
+    return measured[0] - x[i], measured[1] - x[i + 1], measured[2] - x[i + 2]
 
 
 @compiled

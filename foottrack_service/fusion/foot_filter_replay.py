@@ -55,6 +55,7 @@ from foottrack_service.fusion.foot_filter_kernel import (
     floor_covariance,
     propagate,
     update1,
+    update_gyro_bias,
     update_speed,
 )
 from foottrack_service.fusion.foot_filter_memory import Foot
@@ -86,7 +87,7 @@ FLOOR_LEAN = 0.9
 BIAS_SIGMA = 0.006
 """rad/s per 10 ms: how little a quiet foot turns."""
 BIAS_GATE = 100.0
-"""Chi-square: what turns much faster than its gyro can be off by does not rest."""
+"""Chi-square, 3 degrees of freedom: what turns much faster than its gyro can be off by does not rest."""
 UP_SIGMA = 0.04
 """rad: the device's own tilt."""
 UP_CORRELATED_S = 2.0
@@ -230,10 +231,7 @@ def _inertial_updates(s: Foot, row: Array, x: Array, P: Array, dt: float) -> Non
                     h[1], h[6], h[8] = 1.0, -r[2], r[0]
                     update1(x, P, h, off, squared(FLOOR_SIGMA + sigma) * 0.1 / dt, np.inf)
         if row[REST_S] > 0.0:
-            for k in range(3):
-                h[:] = 0.0
-                h[12 + k] = 1.0
-                update1(x, P, h, row[REST_RATE + k] - x[13 + k], BIAS_SIGMA**2 * 0.01 / row[REST_S], BIAS_GATE)
+            update_gyro_bias(x, P, vector(row, REST_RATE), BIAS_SIGMA**2 * 0.01 / row[REST_S], BIAS_GATE)
         if max(P[6, 6], P[8, 8]) > LEVEL_BELOW**2:
             up = (row[ACC] / GRAVITY, row[ACC + 1] / GRAVITY, row[ACC + 2] / GRAVITY)
             _level(up, LEVEL_SIGMA**2 * 0.1 / dt, x, P)

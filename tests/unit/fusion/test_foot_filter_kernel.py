@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,16 @@ from hypothesis import strategies as st
 
 from foottrack_service import rotations as rot
 from foottrack_service.fusion.compiled_rotations import rotation
-from foottrack_service.fusion.foot_filter_kernel import NE, NX, inject, propagate, update1, update3
+from foottrack_service.fusion.foot_filter_kernel import (
+    NE,
+    NX,
+    inject,
+    propagate,
+    update1,
+    update3,
+    update_gyro_bias,
+    update_speed,
+)
 from foottrack_service.fusion.foot_filter_models import attitude_error, point_model
 from foottrack_service.rotations import Array
 
@@ -122,6 +133,21 @@ def test_an_update_is_the_textbook_s(seed: int) -> None:
     one, one_P = x.copy(), P.copy()
     update1(one, one_P, H[0].copy(), y[0], noise[0, 0], np.inf)
     assert np.allclose(one_P, P - np.outer(P @ H[0], P @ H[0]) / (H[0] @ P @ H[0] + noise[0, 0]))
+
+
+@pytest.mark.parametrize(("update", "part", "in_x"), [(update_speed, 3, 3), (update_gyro_bias, 12, 13)])
+def test_a_part_of_the_state_that_is_measured_itself_is_updated_as_any_measurement(
+    update: Callable[..., float], part: int, in_x: int
+) -> None:
+    random = np.random.default_rng(part)
+    x, root, measured = state(random), random.normal(size=(NE, NE)), random.normal(size=3)
+    P = root @ root.T
+    short, short_P, general, general_P = x.copy(), P.copy(), x.copy(), P.copy()
+    H = np.eye(NE)[part : part + 3]
+    expected = update3(general, general_P, H, measured - x[in_x : in_x + 3], 0.04 * np.eye(3), np.inf)
+    assert update(short, short_P, measured, 0.04, np.inf) == pytest.approx(expected)
+    assert short == pytest.approx(general)
+    assert short_P == pytest.approx(general_P)
 
 
 def test_a_gate_leaves_everything_as_it_was() -> None:

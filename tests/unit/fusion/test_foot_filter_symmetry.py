@@ -22,7 +22,7 @@ from foottrack_service.simulation.scenario import simulate
 SETTLED_S = 1.0
 TURNED_ROOM_M, TURNED_ROOM_RAD = 1e-3, 2e-3
 """A foot begins with its toes towards -Z of any room: what is left of that first guess after SETTLED_S, no more."""
-ROUNDING_M, ROUNDING_RAD = 1e-6, 5e-6
+ROUNDING_M, ROUNDING_RAD = 1e-9, 1e-9
 """What is the same but for the order of sums may differ by rounding, and by gates' decisions not at all."""
 MIRROR = np.array([-1.0, 1.0, 1.0])
 MIRROR_TURN = np.array([1.0, -1.0, -1.0])
