@@ -67,7 +67,7 @@ class FusionCore:
         self._sid = sid
         self._body = BodySolver(Skeleton.of(settings.body), settings.body.solver)
         self._gait = GaitLink(settings, self._body.skeleton)
-        self._heads, self._head_punctual = HeadHistory(), Punctuality()
+        self._heads, self._head_punctual, self._heads_strange = HeadHistory(), Punctuality(), False
         self._origin: int | None = None
         self._calibrated: dict[tuple[str, Side | None], Any] = {}
         watched = settings.fusion.mount_calibration and settings.fusion.filter == "error-state"
@@ -149,7 +149,7 @@ class FusionCore:
         return results
 
     def _on_optical(self, side: Side, kind: Kind, message: Message, now: int) -> None:
-        self._feet[side].on_optical(kind, message.t, message.data, now)
+        self._feet[side].on_optical(kind, message.t, message.data, now, self._heads_strange)
         self._started = True
         self._fuse_pictures_in_a_pause(now)
 
@@ -177,7 +177,7 @@ class FusionCore:
                 self._watch.recentred()
             self._body.reset()
         self._origin = body.origin
-        self._heads.strange = self._head_punctual.is_strange(t, now)
+        self._heads_strange = self._head_punctual.is_strange(t, now)
         if not body.tracked or body.p is None or body.q is None or max(map(abs, body.p)) > _MOST_DISTANCE:
             self._heads.add_untracked(t)
             for foot in self._feet.values():

@@ -104,8 +104,11 @@ class Foot:
         self._accepted["imu"] += 1
         self.imu_t = t
 
-    def on_optical(self, kind: Kind, t: int, body: Optical, now: int) -> None:
-        """A camera's fix made at ``t``, arriving at ``now`` (ns). It waits for ``settle`` and its head pose."""
+    def on_optical(self, kind: Kind, t: int, body: Optical, now: int, heads_strange: bool) -> None:
+        """A camera's fix made at ``t``, arriving at ``now`` (ns). It waits for ``settle`` and its head pose.
+
+        ``heads_strange``: the headset's clock may have jumped.
+        """
         if math.dist(body.p, (0.0, 0.0, 0.0)) > MOST_DISTANCE or max(map(abs, body.cov)) > MOST_VARIANCE:
             self.reject("implausible")
         elif self._punctual[kind].is_out_of_turn(t, now):
@@ -113,7 +116,7 @@ class Foot:
         elif self._heads.newest is None:
             self.reject(Verdict.NO_HEAD_POSE)
         else:
-            strange = self._punctual[kind].is_strange(t, now) or self._heads.strange
+            strange = self._punctual[kind].is_strange(t, now) or heads_strange
             if len(self._waiting) == self._waiting.maxlen:
                 self.reject(Verdict.NO_HEAD_POSE)
             self._waiting.append(_Waiting(kind, t, now, body, strange))

@@ -29,8 +29,6 @@ class HeadHistory:
     """
 
     def __init__(self) -> None:
-        self.strange = False
-        """Whether the last poses' age is not what it usually is, as if the clock had jumped."""
         self._stamps: list[int] = []
         self._samples: list[HeadSample | None] = []
 
