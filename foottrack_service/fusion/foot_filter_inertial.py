@@ -95,6 +95,8 @@ class InertialFilter:
         foot["ankle_arm"] = rot.unrotate(self._imu_q, -self._imu_p)
         ball = np.array([1.0, 1.0, BALL_SHARE]) * settings.toe.p
         foot["ball_arm"] = rot.unrotate(self._imu_q, ball - self._imu_p)
+        sole = np.array([ball[0], -settings.ankle_height, ball[2]])
+        foot["sole_arm"] = rot.unrotate(self._imu_q, sole - self._imu_p)
         foot["foot_up"] = rot.unrotate(self._imu_q, np.array([0.0, 1.0, 0.0]))
         foot["foot_to_sensor"] = rot.conjugate(self._imu_q)
         foot["marker_arm"] = rot.unrotate(self._imu_q, np.array(settings.marker.p) - self._imu_p)

@@ -58,6 +58,7 @@ FOOT = np.dtype(
         # stage, NaN without a floor.
         ("ankle_arm", np.float64, 3),
         ("ball_arm", np.float64, 3),
+        ("sole_arm", np.float64, 3),
         ("foot_up", np.float64, 3),
         ("foot_to_sensor", np.float64, 4),
         ("marker_arm", np.float64, 3),

@@ -19,9 +19,10 @@ def test_walks_and_runs_against_motion_capture() -> None:
     assert max(errors) < 0.2
 
 
-@pytest.mark.parametrize(("walk", "plane"), [("short_walk", 0.05), ("long_walk", 0.11)])
+@pytest.mark.parametrize(("walk", "plane"), [("short_walk", 0.05), ("long_walk", 0.085)])
 def test_walks_end_where_they_began(walk: str, plane: float) -> None:
-    # As much as what is left is made by 0.02 deg/s of bias, which 12 s of standing show no better, or 0.2 % of scale.
+    # 0.1 % of the gyro's scale alone moves these ends by 25 and 62 mm, 0.05 deg/s per g by 19 and 65; and in the short
+    # walk the foot ends turned by 21 deg: what came back exactly lies 0.1 m behind the sensor.
     in_plane, height = xio_end_error(walk)
     assert in_plane < plane
     assert abs(height) < 0.01
