@@ -13,8 +13,20 @@ import math
 
 from foottrack_service.compiled import compiled
 from foottrack_service.fusion.compiled_rotations import Vector, quaternion, rotation, squared, turned
-from foottrack_service.fusion.foot_filter_events import ACC, GYRO, IMU, KIND, MEAN_RATE, REST_RATE, REST_S, ROLL, Stamps
-from foottrack_service.fusion.foot_filter_kernel import GRAVITY, speed_distance
+from foottrack_service.fusion.foot_filter_events import (
+    ACC,
+    GYRO,
+    IMU,
+    KIND,
+    MEAN_RATE,
+    REST_RATE,
+    REST_S,
+    ROLL,
+    WRONG_SPEED,
+    WRONG_TILT,
+    Stamps,
+)
+from foottrack_service.fusion.foot_filter_kernel import GRAVITY, ZERO_GATE, speed_distance
 from foottrack_service.fusion.foot_filter_memory import SEEN_KEPT, Foot
 from foottrack_service.rotations import Array
 
@@ -40,12 +52,17 @@ PUSH, PUSH_SHARE = 0.5, 0.3
 """m/s^2, and per unit of the statistic: who is pushed by more, beyond what the tilt is unsure by, does not stand."""
 DOUBT_S = 1.0
 """A push that lasts for longer, in silence, is no push but a wrong tilt."""
+HIDDEN_DOUBT_S = 0.1
+"""So is one that would have to show in |f| (a push sideways makes it longer by its square over 2 g), and does not."""
 
 CALM_SIGMA, CALM_GATE = 0.04, 12.0
 """m/s; who is not quiet by itself, but only beside a swing full of impacts, may be in the middle of the next one: so a
 speed beyond this chi-square is believed rather. In real recordings of walks and runs no stance is further off."""
 CALM_S = 0.25
 """No middle of a swing is calm for longer: then it is the speed that is wrong."""
+GLIDE, STEADY_S = 1.0, 0.25
+"""m, and s where it is as quiet as QUIET_STATISTIC: no foot and no hand glides further at a speed that never changes,
+or for longer without any tremor: then it is the speed that is wrong."""
 
 QUIET_STATISTIC = 0.25
 """A foot this quiet may show its gyro's bias ..."""
@@ -60,9 +77,10 @@ SEEN_LEAST = 6
 SEEN_NOISE = 0.04
 """m/s: fixes of a standing foot may drift apart by so much through errors of the camera's mount."""
 
-# memory, shape (5,): the swing's peak that fades, the newest sample's statistic, how long it was pushed, for how many
-# seconds in all it did not stand, and how long it seemed to stand at a speed that it cannot have then
-PEAK, STATISTIC, DOUBTED, UNREST, TOO_FAST = 0, 1, 2, 3, 4
+# memory, shape (6,): the swing's peak that fades, the newest sample's statistic, how long it was pushed, for how many
+# seconds in all it did not stand, how long it seemed to stand at a speed that it cannot have then, and which share
+# of what a foot may glide it has glided, by what the filter believes
+PEAK, STATISTIC, DOUBTED, UNREST, TOO_FAST, GLIDED = 0, 1, 2, 3, 4, 5
 
 # rest, shape (8,): for how long the foot has rested, s, and its turn meanwhile, rad; the same of the block before that,
 # but as a mean rate, rad/s
@@ -115,7 +133,7 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
 
     Writes into the row how the foot turns meanwhile: over its ball, from long before the heel is seen to rise.
 
-    ``dt``, s, since the last sample; ``x`` and ``P`` the filter before it; ``memory``, shape (5,), is carried from
+    ``dt``, s, since the last sample; ``x`` and ``P`` the filter before it; ``memory``, shape (6,), is carried from
     sample to sample.
     """
     statistic, mean, rate = stillness(t, rows, i, (x[10], x[11], x[12]))
@@ -125,7 +143,7 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
         return 0.0
     memory[PEAK] = max(memory[PEAK] * math.exp(-dt / SWING_MEMORY_S), statistic)
     if statistic >= max(QUIET, SHARE_OF_SWING * memory[PEAK]):
-        memory[DOUBTED] = 0.0
+        memory[DOUBTED] = memory[GLIDED] = 0.0
         return 0.0
     # A smooth push sideways hardly changes |f|, but it shows against what the filter knows to be up.
     a = turned(rotation(quaternion(x, 6)), (mean[0] - x[10], mean[1] - x[11], mean[2] - x[12]))
@@ -133,8 +151,12 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
     pushed = math.sqrt(a[0] * a[0] + squared(a[1] - GRAVITY) + a[2] * a[2])
     if pushed > PUSH + PUSH_SHARE * statistic + 3.0 * GRAVITY * tilt:
         memory[DOUBTED] += dt
-        if memory[DOUBTED] < DOUBT_S:
+        hidden = statistic < QUIET_STATISTIC and pushed * pushed > 4.0 * GRAVITY * FORCE_SPREAD * statistic
+        if memory[DOUBTED] < (HIDDEN_DOUBT_S if hidden else DOUBT_S):
             return 0.0
+        if hidden:
+            rows[i, WRONG_TILT] = pushed / GRAVITY
+            memory[DOUBTED] = 0.0
     sigma = STILL_SIGMA + SIGMA_GROWTH * statistic
     # A device's corrections of its own tilt look like rolling: believed, they cost more than rolling does.
     rolls = rows[i, MEAN_RATE] != 1.0
@@ -147,6 +169,15 @@ def stance_sigma(t: Stamps, rows: Array, i: int, dt: float, x: Array, P: Array, 
             return 0.0
     else:
         memory[TOO_FAST] = 0.0
+    speed2 = x[3] * x[3] + x[4] * x[4] + x[5] * x[5]
+    variance = sigma * sigma * 0.01 / max(dt, 1e-3)
+    if speed2 > ZERO_GATE * variance and speed_distance(x, P, (0.0, 0.0, 0.0), variance) > ZERO_GATE:
+        memory[GLIDED] += dt * max(math.sqrt(speed2) / GLIDE, 1.0 / STEADY_S if statistic < QUIET_STATISTIC else 0.0)
+        if memory[GLIDED] > 1.0:
+            rows[i, WRONG_SPEED] = math.sqrt(speed2)
+            memory[GLIDED] = 0.0
+    else:
+        memory[GLIDED] = 0.0
     memory[UNREST] -= dt
     if rolls:
         rows[i, ROLL], rows[i, ROLL + 1], rows[i, ROLL + 2] = rate

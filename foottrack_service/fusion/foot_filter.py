@@ -148,12 +148,13 @@ def warm_up() -> None:
         _log.info("compiling the foot filter for this machine: about half a minute, this once")
     trial, mount = ErrorStateFilter(FootSettings(), "left"), MountCalibrator(CameraSettings().mount)
     step = 5_000_000
-    for i in range(40):
+    # The second start comes after a silence.
+    for i in (*range(40), *range(300, 340)):
         trial.on_imu(ImuSample(i * step, np.array([0.0, 9.80665, 0.0]), np.zeros(3), None))
         head = HeadSample(i * step, np.array([0.0, 1.6, 0.0]), IDENTITY)
         p, q = np.array([-0.1, -1.55, -0.15]), np.array(FootSettings().marker.q)
         fix = OpticalFix(head.t, "marker", p, q, None, 1e-6 * np.eye(3), 1.0, 50.0, head, head)
         trial.on_fix(fix, head.t)
         mount.add("left", fix, standing=True)
-    trial.estimate(40 * step)
+    trial.estimate(340 * step)
     _log.debug("the foot filter is ready")

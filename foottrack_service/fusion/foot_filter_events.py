@@ -37,6 +37,10 @@ ROLL = 16
 """rad/s, 3 columns: how a foot that stands turns."""
 REST_RATE = 19
 """rad/s, 3 columns: its mean rate over REST_S."""
+WRONG_TILT = 22
+"""rad: so far the tilt is off by what a foot feels that rests quietly; else 0."""
+WRONG_SPEED = 23
+"""m/s: the filter's speed of a foot that rests quietly and has for long; else 0."""
 
 # An optical fix, stage.
 POINT = 1
@@ -66,3 +70,5 @@ YAW_SIGMA = 9
 """rad; MEASURED_Q gives the yaw when TURN_SIGMA is not 0."""
 TILT_SIGMA = 10
 """rad: added to what the tilt is unsure by."""
+WHOLE = 2.0
+"""As TURN_SIGMA: MEASURED_Q gives the whole attitude, and TILT_SIGMA is all that the tilt is unsure by."""

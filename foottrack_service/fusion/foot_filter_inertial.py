@@ -37,6 +37,7 @@ from foottrack_service.fusion.foot_filter_kernel import NE
 from foottrack_service.fusion.foot_filter_memory import DEPTH, MARKER, new_foot
 from foottrack_service.fusion.foot_filter_models import attitude_error
 from foottrack_service.fusion.foot_filter_optical import (
+    DOUBTED,
     FAR,
     IMPOSSIBLE,
     STALE,
@@ -50,6 +51,7 @@ from foottrack_service.fusion.foot_filter_optical import (
 from foottrack_service.fusion.foot_filter_output import CONTACT, predicted
 from foottrack_service.fusion.foot_filter_range import SCALE, SEEN
 from foottrack_service.fusion.foot_filter_sample import FIRST, JUMPED, LEFT_OUT, first_state, take_sample, upright
+from foottrack_service.fusion.in_motion_alignment import InMotionAlignment
 from foottrack_service.fusion.interface import ImuSample, Kind, Moves, OpticalFix, Verdict, Whereabouts
 from foottrack_service.fusion.timeline import Timeline
 from foottrack_service.fusion.whose_motion import moves
@@ -82,6 +84,7 @@ class InertialFilter:
         self._seen_yaw = False
         self._blob = Blob(foot)
         self.doubt = Doubt()
+        self._alignment = InMotionAlignment(self._foot, self._timeline)
         self.other: Whereabouts = lambda kind, t: None
         """The other foot's ``target``, and its ``moves``."""
         self.other_moves: Moves = lambda frm, to: None
@@ -144,6 +147,11 @@ class InertialFilter:
             self._q_alt[:] = fix.q_alt
         kind = DEPTH if fix.kind == "depth" else MARKER
         taken = take_fix(self._foot, fix.t, kind, has_q, has_alt, fix.strange)
+        off = float(np.linalg.norm(self._foot["residual"][0]))
+        if taken in (TAKEN, DOUBTED) and self._alignment.holds(fix.t, off):
+            settle_fix(self._foot, int(self._foot["fix_at"][0]), True, True)
+            self._alignment.refine()
+            taken = TAKEN
         if taken == TAKEN:
             self._accepted(fix.kind)
             return Verdict.ACCEPTED
@@ -275,7 +283,8 @@ class InertialFilter:
         point, arm = row[POINT : POINT + 3].copy(), row[ARM : ARM + 3].copy()
         sigma = math.sqrt(max(row[POINT_COV], row[POINT_COV + 4], row[POINT_COV + 8]))
         if float(off @ off) > NOT_OURS**2:
-            self.doubt.whose.see(fix.t, fix.kind, point, sigma, self.moves, self.other_moves)
+            if not fix.strange:
+                self.doubt.whose.see(fix.t, fix.kind, point, sigma, self.moves, self.other_moves)
             if self.doubt.is_others(t, point, off, unrest, self.other(fix.kind, fix.t)):
                 settle_fix(self._foot, i, False, False)
                 return Verdict.IDENTITY
@@ -321,6 +330,8 @@ class InertialFilter:
                 if timeline.rows[i, TILT_SIGMA] > 0.0:
                     timeline.rows[j, TURN_SIGMA] = abs(timeline.rows[j, TURN_SIGMA])
         settle_fix(self._foot, i, False, False)
+        self._alignment.begin(i)
+        self._alignment.refine()
         self.acquired = True
         self._forget_motion()
         self._lock[:] = 0.0

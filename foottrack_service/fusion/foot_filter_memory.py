@@ -38,7 +38,7 @@ FOOT = np.dtype(
         ("behind", np.int64),
         ("effort", np.float64),
         # Stance (contact.py), and what is held of a foot that stands (foot_filter_output.py).
-        ("stance", np.float64, 5),
+        ("stance", np.float64, 6),
         ("rest", np.float64, 8),
         ("lock", np.float64, 9),
         # Whether fixes have said where the foot is, and not too long ago; the last few accepted ones, oldest first, and

@@ -27,6 +27,7 @@ from foottrack_service.fusion.foot_filter_events import (
     POINT_COV,
     TEACHES,
     TURN_SIGMA,
+    WRONG_SPEED,
     ZERO_SIGMA,
 )
 from foottrack_service.fusion.foot_filter_kernel import LONGEST_DELAY_S, NE, invert3, seen_through
@@ -165,6 +166,7 @@ def _accept(s: Foot, i: int, strange: bool) -> None:
         for j in range(i + 1, s.n):
             if s.rows[j, ZERO_SIGMA] > 0.0:
                 s.rows[j, ZERO_SIGMA] = max(s.rows[j, ZERO_SIGMA], s.seen_speed)
+                s.rows[j, WRONG_SPEED] = 0.0
 
 
 @compiled
@@ -219,7 +221,7 @@ def _take_attitude(s: Foot, row: Array, x: Array, P: Array, has_q: bool, has_alt
         row[FACE + k] = face[k]
     across2 = TURN_PER_METRE * TURN_PER_METRE * max(0.0, _smallest(s.cov[:]))
     turn_sigma = math.sqrt(LEAST_TURN_SIGMA * LEAST_TURN_SIGMA + across2)
-    row[TURN_SIGMA] = turn_sigma if least <= TILT_USABLE + unsure else -turn_sigma
+    row[TURN_SIGMA] = turn_sigma if least <= TILT_USABLE + unsure and unsure < 0.6 else -turn_sigma
     return True
 
 

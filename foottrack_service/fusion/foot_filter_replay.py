@@ -43,14 +43,17 @@ from foottrack_service.fusion.foot_filter_events import (
     TURN_SIGMA,
     UP,
     WANDER,
+    WHOLE,
+    WRONG_SPEED,
+    WRONG_TILT,
     YAW_SIGMA,
     ZERO_SIGMA,
-    Stamps,
 )
 from foottrack_service.fusion.foot_filter_kernel import (
     GRAVITY,
     NE,
     NX,
+    ZERO_GATE,
     bound,
     floor_covariance,
     propagate,
@@ -72,10 +75,11 @@ HOLE_SPEED = 1.5
 HOLE_FADE_S = 0.15
 """How soon a foot that nobody measures has forgotten its speed."""
 HOLE_WALK, FUSED_HOLE_WALK = 0.7, 0.03
-"""rad/sqrt(s): how an attitude that nobody measures wanders; and that of a device which keeps its own."""
+"""rad/sqrt(s): how a yaw that nobody measures wanders; and the attitude of a device which keeps its own."""
+HOLE_TILT, HOLE_TILT_FADE_S = 0.45, 0.3
+"""rad per axis: how much a foot leans that nobody measures, and how soon it has forgotten how it leant: mostly it is
+flat, and half a radian off is easier to mend than what it was off by in the middle of a swing."""
 LONGEST_HOLE_S = 1.0
-ZERO_GATE = 30.0
-"""A stance never overrules a velocity that is clearly known: chi-square, 3 degrees of freedom."""
 FLOOR_GATE = 12.0
 FLOOR_SIGMA = 0.005
 """m, of a standing ankle's height."""
@@ -84,6 +88,8 @@ FLOOR_UNSEEN, FLOOR_NEAR = 0.006, 0.08
 floor than a stair. Held against the height's own sigma: one sample's weight is far less than what a stance is worth."""
 FLOOR_LEAN = 0.9
 """Cosine: a foot that leans more stands on its heel or toes, and the ankle's height says nothing."""
+WRONG_FOR_S = 1.0
+"""For so long a speed may have been wrong that a resting foot shows to be."""
 BIAS_SIGMA = 0.006
 """rad/s per 10 ms: how little a quiet foot turns."""
 BIAS_GATE = 100.0
@@ -111,7 +117,7 @@ def replay(s: Foot, start: int, end: int) -> None:
                 P[j, k] = s.P[i - 1, j, k]
         dt = (t[i] - t[i - 1]) * 1e-9
         if dt > 0.0:
-            _advance(t, rows, x, P, i, end, dt)
+            _advance(s, x, P, i, end, dt)
         if row[KIND] == IMU:
             _inertial_updates(s, row, x, P, min(dt, HOLE_S))
         elif row[KIND] == RESET:
@@ -144,8 +150,9 @@ def _rate(rows: Array, x: Array, i: int, end: int) -> Vector:
 
 
 @compiled
-def _advance(t: Stamps, rows: Array, x: Array, P: Array, i: int, end: int, dt: float) -> None:
+def _advance(s: Foot, x: Array, P: Array, i: int, end: int, dt: float) -> None:
     """Carry the state over the dt before event i."""
+    t, rows = s.t[:], s.rows[:]
     before = _neighbour(rows, i, -1, end)
     after = i if rows[i, KIND] == IMU else _neighbour(rows, i, 1, end)
     if after < 0:
@@ -170,7 +177,7 @@ def _advance(t: Stamps, rows: Array, x: Array, P: Array, i: int, end: int, dt: f
             for k in range(6, 9):
                 P[k, k] += w2 * GAP_SHARE**2 * gap * dt
     else:
-        _coast(x, P, gyro, fused, dt)
+        _coast(x, P, vector(s.foot_up, 0), gyro, fused, dt)
 
 
 @compiled
@@ -184,11 +191,16 @@ def _middle(a: Vector, b: Vector) -> Vector:
 
 
 @compiled
-def _coast(x: Array, P: Array, gyro: Vector, fused: bool, dt: float) -> None:
-    """Across a hole: the speed fades and wanders; a device with an attitude of its own still tells the turn."""
+def _coast(x: Array, P: Array, up: Vector, gyro: Vector, fused: bool, dt: float) -> None:
+    """Across a hole: the speed fades and wanders; a device with an attitude of its own still tells the turn.
+
+    Without one the tilt fades and wanders too; ``up`` is the foot's own, sensor frame.
+    """
     if fused:
         turn = turned(rotation(quaternion(x, 6)), gyro)
         turn_stage(x[6:10], turn[0] * dt, turn[1] * dt, turn[2] * dt)
+    else:
+        _flatten(x, P, up, math.exp(-dt / HOLE_TILT_FADE_S))
     fade = math.exp(-dt / HOLE_FADE_S)
     reach = HOLE_FADE_S * (1.0 - fade)
     for k in range(3):
@@ -205,7 +217,24 @@ def _coast(x: Array, P: Array, gyro: Vector, fused: bool, dt: float) -> None:
     for k in range(3):
         P[k, k] += 2.0 * HOLE_SPEED**2 * HOLE_FADE_S * max(capped - reach, 0.0)
         P[3 + k, 3 + k] += HOLE_SPEED**2 * (1.0 - fade * fade)
-        P[6 + k, 6 + k] += capped * (FUSED_HOLE_WALK if fused else HOLE_WALK) ** 2
+        if fused or k == 1:
+            P[6 + k, 6 + k] += capped * (FUSED_HOLE_WALK if fused else HOLE_WALK) ** 2
+
+
+@compiled
+def _flatten(x: Array, P: Array, up: Vector, fade: float) -> None:
+    """The foot's tilt fades to this share of itself."""
+    u = turned(rotation(quaternion(x, 6)), up)
+    sine = math.sqrt(u[0] * u[0] + u[2] * u[2])
+    if sine > 1e-9:
+        turn = (1.0 - fade) * math.atan2(sine, u[1]) / sine
+        turn_stage(x[6:10], -turn * u[2], 0.0, turn * u[0])
+    for k in (6, 8):
+        for j in range(NE):
+            P[k, j] *= fade
+        for j in range(NE):
+            P[j, k] *= fade
+        P[k, k] += HOLE_TILT**2 * (1.0 - fade * fade)
 
 
 @compiled
@@ -216,6 +245,7 @@ def _inertial_updates(s: Foot, row: Array, x: Array, P: Array, dt: float) -> Non
     h = np.zeros(NE)
     sigma = row[ZERO_SIGMA]
     if sigma > 0.0:
+        _doubt(row, P)
         held = update_speed(x, P, _rolling(s, row, x), sigma * sigma * 0.01 / dt, ZERO_GATE) <= ZERO_GATE
         if held and row[FLOOR] == row[FLOOR]:
             R = rotation(quaternion(x, 6))
@@ -237,6 +267,18 @@ def _inertial_updates(s: Foot, row: Array, x: Array, P: Array, dt: float) -> Non
             _level(up, LEVEL_SIGMA**2 * 0.1 / dt, x, P)
     if row[UP] != 0.0 or row[UP + 1] != 0.0 or row[UP + 2] != 0.0:
         _level(vector(row, UP), UP_SIGMA**2 * UP_CORRELATED_S / dt, x, P)
+
+
+@compiled
+def _doubt(row: Array, P: Array) -> None:
+    """What a foot that rests has shown to be wrong is known by no more than that."""
+    if row[WRONG_TILT] > 0.0:
+        P[6, 6] += squared(row[WRONG_TILT])
+        P[8, 8] += squared(row[WRONG_TILT])
+    if row[WRONG_SPEED] > 0.0:
+        for k in range(3):
+            P[k, k] += squared(row[WRONG_SPEED] * WRONG_FOR_S)
+            P[3 + k, 3 + k] += squared(row[WRONG_SPEED])
 
 
 @compiled
@@ -266,8 +308,15 @@ def _level(up: Vector, variance: float, x: Array, P: Array) -> None:
 
 @compiled
 def _reset(row: Array, x: Array, P: Array) -> None:
-    """A new start of place, speed and yaw; tilt and biases stay."""
-    if row[TURN_SIGMA] > 0.0:
+    """A new start of place, speed and yaw, or of the whole attitude; biases, and else the tilt, stay."""
+    if row[TURN_SIGMA] == WHOLE:
+        for k in range(4):
+            x[6 + k] = row[MEASURED_Q + k]
+        for k in (6, 8):
+            for j in range(NE):
+                P[k, j] = 0.0
+                P[j, k] = 0.0
+    elif row[TURN_SIGMA] > 0.0:
         # The twist about up of the turn from the state's attitude to the measured one.
         a, b = quaternion(row, MEASURED_Q), quaternion(x, 6)
         y = -a[3] * b[1] + a[0] * b[2] + a[1] * b[3] - a[2] * b[0]

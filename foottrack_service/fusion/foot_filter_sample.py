@@ -21,9 +21,10 @@ from foottrack_service.fusion.foot_filter_events import (
     MEAN_RATE,
     UP,
     WANDER,
+    WRONG_SPEED,
     ZERO_SIGMA,
 )
-from foottrack_service.fusion.foot_filter_kernel import GRAVITY, NE, NX
+from foottrack_service.fusion.foot_filter_kernel import ACC_BIAS, GRAVITY, NE, NX
 from foottrack_service.fusion.foot_filter_memory import Feet, Foot
 from foottrack_service.fusion.foot_filter_output import follow
 from foottrack_service.fusion.foot_filter_replay import HOLE_S, replay
@@ -59,9 +60,6 @@ FULL_EFFORT = 3.0
 """m/s^2 beyond gravity at which all of that is there."""
 EFFORT_MEMORY_S = 2.0
 """A device that was moved levels itself again afterwards: its tilt goes on wandering in the stance."""
-ACC_BIAS = 0.2
-"""m/s^2 per axis: data sheets allow 0.17 to 0.2. Who believes less never learns it, and loses
-centimetres in a swing."""
 _UP = np.array([0.0, 1.0, 0.0])
 
 
@@ -98,6 +96,8 @@ def take_sample(foot: Feet, t: int, has_gyro: bool, has_q: bool) -> int:
         sigma = stance_sigma(s.t[:], s.rows[:], i, dt, s.X[i - 1], s.P[i - 1], s.stance[:])
         if sigma > 0.0:
             row[ZERO_SIGMA] = math.sqrt(sigma * sigma + s.seen_speed * s.seen_speed)
+        if s.seen_speed > 0.0:
+            row[WRONG_SPEED] = 0.0
         rest(s, row, s.P[i - 1], dt if sigma > 0.0 and s.seen_speed == 0.0 else 0.0)
         row[FLOOR] = math.nan if abs(t - s.tag_t) < TAG_MEMORY_NS else s.floor
         replay(s, i, s.n)

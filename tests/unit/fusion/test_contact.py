@@ -44,9 +44,9 @@ def test_a_known_bias_of_the_accelerometer_moves_nobody() -> None:
     assert stillness(t, made, 39)[0] == pytest.approx(2.0)
     assert stillness(t, made, 39, (0.0, 0.6, 0.0))[0] == pytest.approx(0.0, abs=1e-6)
     x, P = upright()
-    assert stance_sigma(t, made, 39, 0.0025, x, P, np.zeros(5)) == 0.0
+    assert stance_sigma(t, made, 39, 0.0025, x, P, np.zeros(6)) == 0.0
     x[11] = 0.6
-    assert stance_sigma(t, made, 39, 0.0025, x, P, np.zeros(5)) > 0.0
+    assert stance_sigma(t, made, 39, 0.0025, x, P, np.zeros(6)) > 0.0
 
 
 def test_the_statistic_by_hand() -> None:
@@ -80,16 +80,16 @@ def test_rates_of_a_device_s_own_attitude_are_averaged() -> None:
 
 def test_a_still_foot_stands_and_a_swinging_one_does_not() -> None:
     t, made = still()
-    assert stance_sigma(t, made, 39, 0.005, *upright(), np.zeros(5)) == pytest.approx(STILL_SIGMA, abs=1e-6)
+    assert stance_sigma(t, made, 39, 0.005, *upright(), np.zeros(6)) == pytest.approx(STILL_SIGMA, abs=1e-6)
     made[:, GYRO] = 2.0
-    assert stance_sigma(t, made, 39, 0.005, *upright(), np.zeros(5)) == 0.0
+    assert stance_sigma(t, made, 39, 0.005, *upright(), np.zeros(6)) == 0.0
 
 
 def test_a_runner_s_stance_counts_against_the_swing_before_it_but_less() -> None:
     t, made = still()
     made[:, GYRO] = 0.9  # a statistic of 3
-    assert stance_sigma(t, made, 39, 0.005, *upright(), np.zeros(5)) == 0.0
-    after_a_swing = np.zeros(5)
+    assert stance_sigma(t, made, 39, 0.005, *upright(), np.zeros(6)) == 0.0
+    after_a_swing = np.zeros(6)
     after_a_swing[PEAK] = 50.0
     assert stance_sigma(t, made, 39, 0.005, *upright(), after_a_swing) > 5.0 * STILL_SIGMA
 
@@ -99,9 +99,9 @@ def test_a_smooth_push_is_no_stance_until_it_has_lasted_too_long_to_be_one() -> 
     made[:, ACC] = 1.5  # 0.1 m/s^2 in the norm
     x, P = upright()
     assert stillness(t, made, 39)[0] < QUIET
-    memory = np.zeros(5)
+    memory = np.zeros(6)
     assert stance_sigma(t, made, 39, 0.005, x, P, memory) == 0.0
-    assert stance_sigma(t, made, 39, 0.005, *upright(0.1), np.zeros(5)) > 0.0
+    assert stance_sigma(t, made, 39, 0.005, *upright(0.1), np.zeros(6)) > 0.0
     found = [stance_sigma(t, made, 39, 0.005, x, P, memory) for _ in range(250)]
     assert found[100] == 0.0
     assert found[-1] > 0.0
@@ -131,7 +131,7 @@ def test_a_speed_that_no_stance_has_is_believed_for_as_long_as_a_swing_may_be_ca
     x, P = upright()
     x[3] = 1.5
     P[3:6, 3:6] = 0.05**2 * np.eye(3)
-    memory = np.zeros(5)
+    memory = np.zeros(6)
     memory[PEAK] = 100.0
     found = [stance_sigma(t, made, 39, 0.005, x, P, memory) for _ in range(60)]
     assert np.count_nonzero(found) == 60 - round(CALM_S / 0.005) + 1
