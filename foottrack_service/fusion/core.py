@@ -5,6 +5,7 @@ The same messages at the same instants give the same results to the bit, so a re
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -35,17 +36,20 @@ from foottrack_service.fusion.gait_link import GaitLink
 from foottrack_service.fusion.head_history import HeadHistory
 from foottrack_service.fusion.interface import FootEstimate, HeadSample, Kind
 from foottrack_service.fusion.mount_watch import MountWatch
+from foottrack_service.fusion.plausible import MOST_DISTANCE, is_plausible, within
 from foottrack_service.fusion.punctuality import Punctuality
 from foottrack_service.rotations import Array
 
 SOURCE = "fusion"
-_MOST_DISTANCE = 1000.0
-"""m: a head further from the stage's origin is no pose."""
 _PAUSE_NS = 3_000_000
 """What fusing a picture's two fixes may take, on a core that was asleep (measured: 1 ms)."""
+_TAKEN = ("imu", "marker", "depth", "head", "calibration")
+"""What is fused, of all that a recording holds."""
 _AHEAD_NS = 100_000_000
 """What is stamped by so much later than it arrives comes from a clock that is wrong. (A clock over the network is known
 to a few ms, and a runtime may predict its poses to the next frame or two.)"""
+
+_log = logging.getLogger(__name__)
 
 
 class FusionCore:
@@ -70,6 +74,7 @@ class FusionCore:
         self._heads, self._head_punctual, self._heads_strange = HeadHistory(), Punctuality(), False
         self._origin: int | None = None
         self._calibrated: dict[tuple[str, Side | None], Any] = {}
+        self._warned: set[str] = set()
         watched = settings.fusion.mount_calibration and settings.fusion.filter == "error-state"
         self._watch = MountWatch(settings.camera) if watched else None
         self._feet: dict[Side, Foot] = {side: Foot(settings, side, self._heads, self._watch, make) for side in SIDES}
@@ -85,7 +90,7 @@ class FusionCore:
 
     @property
     def health(self) -> dict[str, FilterHealth]:
-        """Accepted and rejected measurements by ``user/side``."""
+        """Accepted and rejected measurements by ``user/side``; what was bad for both feet counts for each."""
         return {f"{self._user}/{side}": foot.health for side, foot in self._feet.items()}
 
     @property
@@ -104,16 +109,12 @@ class FusionCore:
             return []
         kind, _, tail = message.stream.partition("/")
         side: Side | None = "left" if tail == "left" else "right" if tail == "right" else None
-        if message.t - now > _AHEAD_NS:
-            for foot in self._feet.values() if side is None else (self._feet[side],):
-                foot.reject("ahead")
+        if kind in _TAKEN and (message.t - now > _AHEAD_NS or not message.valid):
+            self._reject("ahead" if message.valid else "invalid", side)
             return []
         if kind == "imu" and side:
             return self._on_imu(side, message, now)
-        if not message.valid:
-            if side and kind in ("marker", "depth"):
-                self._feet[side].reject("invalid")
-        elif kind == "marker" and side:
+        if kind == "marker" and side:
             self._on_optical(side, "marker", message, now)
         elif kind == "depth" and side:
             self._on_optical(side, "depth", message, now)
@@ -135,9 +136,6 @@ class FusionCore:
         return self._publish(now)
 
     def _on_imu(self, side: Side, message: Message, now: int) -> list[Message]:
-        if not message.valid:
-            self._feet[side].reject("invalid")
-            return []
         previous = self._feet[side].imu_t
         self._feet[side].on_imu(message.t, message.data)
         self._started = True
@@ -165,7 +163,7 @@ class FusionCore:
 
     def _on_head(self, t: int, body: HeadPose, now: int) -> None:
         if self._origin is not None and body.origin != self._origin:
-            moved = body.moved
+            moved = body.moved if body.moved is not None and within(body.moved.p, MOST_DISTANCE) else None
             p, q = (None, None) if moved is None else (np.array(moved.p), np.array(moved.q))
             if p is None or q is None:
                 self._heads.clear()
@@ -178,7 +176,10 @@ class FusionCore:
             self._body.reset()
         self._origin = body.origin
         self._heads_strange = self._head_punctual.is_strange(t, now)
-        if not body.tracked or body.p is None or body.q is None or max(map(abs, body.p)) > _MOST_DISTANCE:
+        far = not within(body.p or (), MOST_DISTANCE)
+        if far:
+            self._reject("implausible")
+        if not body.tracked or body.p is None or body.q is None or far:
             self._heads.add_untracked(t)
             for foot in self._feet.values():
                 foot.on_head_lost()
@@ -188,6 +189,12 @@ class FusionCore:
         self._fuse_pictures_in_a_pause(now)
 
     def _on_calibration(self, found: Any) -> None:
+        if not is_plausible(found):
+            self._reject("implausible", found.values.side if isinstance(found, ImuCalibration) else None)
+            if found.kind not in self._warned:
+                self._warned.add(found.kind)
+                _log.warning("a calibration (%s) is left out, for nothing is like that: %s", found.kind, found.values)
+            return
         # Every calibration comes again every 5 s, and a filter that is placed anew has to find its foot again. Only one
         # that began anew (foot.py) needs it again.
         kind = (found.kind, found.values.side if isinstance(found, ImuCalibration) else None)
@@ -215,6 +222,10 @@ class FusionCore:
                 self._watch.restart(found.values)
             for foot in self._feet.values():
                 foot.on_mount(found.values)
+
+    def _reject(self, reason: str, side: Side | None = None) -> None:
+        for foot in self._feet.values() if side is None else (self._feet[side],):
+            foot.reject(reason)
 
     def _publish(self, now: int) -> list[Message]:
         self._last_output = now

@@ -115,6 +115,79 @@ def test_what_no_foot_can_feel_is_counted_and_left_out(acc):
     assert core.health["user/left"].accepted == {"imu": 1}
 
 
+def body_values(**wrong):
+    values = {"height": 1.8, "thigh": 0.5, "shank": 0.4, "torso": 0.7, "hip_width": 0.3, "hip_back": 0.1}
+    return m.BodyCalibration(values=m.BodyValues(**{**values, **wrong}))
+
+
+def mount_values(p=(0.0, 0.0, 0.0), sigma_p=1e-3, sigma_q=1e-3):
+    base = Settings().camera.mount_hash
+    return m.MountCalibration(values=m.MountValues(p=p, q=IDENTITY, sigma_p=sigma_p, sigma_q=sigma_q, base=base))
+
+
+def imu_values(side="left", acc_bias=(0, 0, 0), gyro_bias=(0, 0, 0), p=(0, 0, 0)):
+    return m.ImuCalibration(values=m.ImuValues(side=side, acc_bias=acc_bias, gyro_bias=gyro_bias, p=p, q=IDENTITY))
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        m.FloorCalibration(values=m.FloorValues(height=1.7e308)),
+        m.HeadingCalibration(values=m.HeadingValues(yaw=0.0, imu_yaw=m.PerSideYaw(left=-1e308))),
+        body_values(shank=0.0),
+        body_values(thigh=1.7e308),
+        body_values(hip_back=-1e308),
+        mount_values(p=(0.0, 1.7e308, 0.0)),
+        mount_values(sigma_p=1e300),
+        mount_values(sigma_q=1e300),
+        imu_values(p=(1e300, 0, 0)),
+        imu_values(acc_bias=(0, -1e308, 0)),
+        imu_values(gyro_bias=(0, 0, 1e308)),
+    ],
+    ids=lambda found: found.kind,
+)
+def test_a_calibration_of_nobody_stops_nothing_is_counted_and_left_out(found, caplog):
+    def run(core, calibrations):
+        outs = feed(core, [head(0), imu(0)])
+        for t in range(10 * MS, 400 * MS, 10 * MS):
+            outs += feed(core, [head(t), imu(t), marker(t, (-0.1, -1.55, -0.15), q=TAG_ON_INSTEP)])
+            outs += feed(core, [message("calibration", t, each) for each in calibrations])
+        return outs
+
+    core = FusionCore(Settings())
+    outs = run(core, [found])
+    assert [found.kind in record.getMessage() for record in caplog.records] == [True]
+    assert [decode(encode(out)) for out in outs] == run(FusionCore(Settings()), [])
+    assert core.health["user/left"].rejected["implausible"] == 39
+    assert core.health["user/right"].rejected == ({} if found.kind == "imu" else {"implausible": 39})
+
+
+def test_a_head_that_is_nowhere_or_is_not_sure_is_counted():
+    core = FusionCore(Settings())
+    outs = feed(core, [head(0), imu(0), head(5 * MS, p=(0.0, 1e300, 0.0)), imu(10 * MS)])
+    assert outs[0].data.head is not None and outs[-1].data.head is None
+    core.handle(head(15 * MS)._replace(valid=False), 15 * MS)
+    for side in ("left", "right"):
+        assert core.health[f"user/{side}"].rejected == {"implausible": 1, "invalid": 1}
+
+
+def test_what_is_never_fused_is_not_counted():
+    core = FusionCore(Settings())
+    core.handle(message("truth/left", 10**12, m.Truth(p=(0.0, 0.0, 0.0), q=IDENTITY)), 0)
+    assert core.health["user/left"].rejected == {}
+
+
+def test_a_stage_that_moved_by_more_than_there_is_is_one_that_moved_nobody_knows_how():
+    results = []
+    for moved in (None, m.Pose(p=(1.7e308, -1.7e308, 0.0), q=tuple(rot.from_yaw(0.5).tolist()))):
+        core = FusionCore(Settings())
+        outs = feed(core, [head(0), imu(0), imu(0, "right"), head(2 * MS, p=(5.0, 1.6, 5.0), origin=1, moved=moved)])
+        for t in range(10 * MS, 400 * MS, 10 * MS):
+            outs += feed(core, [head(t, p=(5.0, 1.6, 5.0), origin=1), imu(t), imu(t, "right")])
+        results.append(outs)
+    assert results[0] == results[1]
+
+
 def test_a_fix_without_a_head_is_rejected_as_such():
     core = FusionCore(Settings())
     feed(core, [imu(0), marker(0, (0.0, -1.5, 0.0))])
