@@ -80,7 +80,8 @@ class FramesetReader:
             # The shortest way ever seen maps the device's clock; it leaks by 20 us/s to follow its drift.
             offset = arrival - stamp
             leaked = offset if self._offset is None else self._offset + 333
-            self._offset = min(offset, leaked)
+            # It counts us in 32 bits: after 71 minutes it begins again. No picture is on its way for so long.
+            self._offset = offset if offset - leaked > _TIMEOUT_MS * 1_000_000 else min(offset, leaked)
             return stamp + self._offset - early
         return arrival - early
 

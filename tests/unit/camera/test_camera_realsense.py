@@ -146,6 +146,17 @@ def test_hardware_clock_follows_the_shortest_way(device: Device) -> None:
     assert least < 3_100_000
 
 
+def test_hardware_clock_that_begins_again_after_71_minutes_is_followed(device: Device) -> None:
+    wraps = 2**32 * 1e-3
+    stamps = [(wraps + stamp - STAMPS[4]) % wraps for stamp in STAMPS]
+    assert stamps[4] < stamps[3]
+    domain = device.rs.timestamp_domain.hardware_clock
+    frames = deliver(device, RealSenseSettings(readout=0.0), 0.0001, domain, stamps, [2_000_000] * len(stamps))
+    assert {frame.number < 4 for frame in frames} == {True, False}
+    for frame in frames:
+        assert frame.t - (NOW + frame.number * PERIOD) == pytest.approx(1_950_000, abs=3_000)
+
+
 def test_inverse_brown_conrady_is_fitted() -> None:
     rs = _rs()
     lens = rs.intrinsics()
