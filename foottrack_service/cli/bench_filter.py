@@ -93,9 +93,9 @@ def _walk(settings: Settings) -> tuple[list[Call], list[tuple[bytes, bytes]], li
         filter_ = make_filter(settings, side)
         on_imu, on_fix = filter_.on_imu, filter_.on_fix
 
-        def imu(sample: ImuSample) -> None:
+        def imu(sample: ImuSample) -> bool:
             calls.append((sample, None))
-            on_imu(sample)
+            return on_imu(sample)
 
         def fix(fix: OpticalFix, now: int) -> Verdict:
             calls.append((fix, now))

@@ -15,11 +15,14 @@ from foottrack_service.cli.findings import Finding
 from foottrack_service.cli.joining import joined
 from foottrack_service.cli.running import ConfigOption, ConnectOption, JsonOption, print_json, run_loop, settings_for
 from foottrack_service.config import Settings
+from foottrack_service.fusion.interface import Verdict
 
 if TYPE_CHECKING:
     from foottrack_service.bus.control_client import ControlClient
 
 _TOO_SLOW_HZ = {"imu": 50.0, "head": 60.0, "marker": 15.0}
+_REFUSED = frozenset(Verdict) - {Verdict.ACCEPTED, Verdict.UNUSED, Verdict.INVALID}
+"""What a filter says of fixes. Samples and heads that were left out have nothing to do with tags."""
 _MARKS = {
     "ok": "[green]ok[/]     ",
     "note": "[blue]note[/]   ",
@@ -144,7 +147,7 @@ async def _streams(client: ControlClient, user: str) -> list[Finding]:
         if name.rpartition("/")[2] not in SIDES:
             continue
         total = sum(counts["accepted"].get(kind, 0) for kind in ("marker", "depth"))
-        refused = sum(count for reason, count in counts["rejected"].items() if reason not in ("unused", "invalid"))
+        refused = sum(counts["rejected"].get(verdict, 0) for verdict in _REFUSED)
         if total + refused > 100 and refused > total:
             found.append(
                 Finding(

@@ -100,9 +100,11 @@ class Foot:
         if self._gyro_bias is not None and gyro is not None:
             gyro = gyro - self._gyro_bias
         q = None if body.q is None else np.array(body.q)
-        self._filter.on_imu(ImuSample(t - self._delay_ns, acc, gyro, q))
-        self._accepted["imu"] += 1
-        self.imu_t = t
+        if self._filter.on_imu(ImuSample(t - self._delay_ns, acc, gyro, q)):
+            self._accepted["imu"] += 1
+            self.imu_t = t
+        else:
+            self.reject("imu_stale")
 
     def on_optical(self, kind: Kind, t: int, body: Optical, now: int, heads_strange: bool) -> None:
         """A camera's fix made at ``t``, arriving at ``now`` (ns). It waits for ``settle`` and its head pose.

@@ -59,11 +59,13 @@ class ErrorStateFilter:
         # The pictures' filter knows nothing while the IMU lives.
         return self._inertial.standing if self._pictures.newest is None else self._pictures.contact
 
-    def on_imu(self, sample: ImuSample) -> None:
-        """Take a sample, in order of arrival."""
-        if self._inertial.on_imu(sample):
+    def on_imu(self, sample: ImuSample) -> bool:
+        """Take a sample, in order of arrival. False: it is left out (see InertialFilter)."""
+        taken = self._inertial.on_imu(sample)
+        if taken:
             self._ladder.saw_imu(sample.t)
             self._device_q = sample.q
+        return taken
 
     def on_fix(self, fix: OpticalFix, now: int) -> Verdict:
         """Take an optical fix that arrives at ``now``, later than its own ``t``."""

@@ -135,8 +135,8 @@ class FootFilter(Protocol):
     def standing(self) -> bool:
         """Whether the foot stood still when the newest measurement was made."""
 
-    def on_imu(self, sample: ImuSample) -> None:
-        """Take a sample, in order of arrival."""
+    def on_imu(self, sample: ImuSample) -> bool:
+        """Take a sample, in order of arrival. False: it is left out, from the past mostly."""
 
     def on_fix(self, fix: OpticalFix, now: int) -> Verdict:
         """Take an optical fix that arrives at ``now``, later than its own ``t``."""

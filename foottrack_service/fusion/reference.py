@@ -165,7 +165,7 @@ class ReferenceFilter:
         """Whether the foot stood still when the newest sample was taken."""
         return self._stationary
 
-    def on_imu(self, sample: ImuSample) -> None:
+    def on_imu(self, sample: ImuSample) -> bool:
         """Predict to the sample, then fuse its acceleration unless the foot stands."""
         self._attitude.update(sample)
         ax, ay, az = rot.rotate(self._attitude.sensor_to_stage, sample.acc).tolist()
@@ -177,6 +177,7 @@ class ReferenceFilter:
         if not self._stationary:
             self._kinematics.correct(ACCELERATION, (ax, ay, az), ACCELERATION_NOISE)
         self._ladder.saw_imu(sample.t)
+        return True
 
     def on_fix(self, fix: OpticalFix, now: int) -> Verdict:
         """Fuse the tag's place with the newest head pose, as if it had been seen at ``now``."""

@@ -131,6 +131,19 @@ def test_two_outputs_into_one_application_are_warned_of(tmp_path: Path) -> None:
     assert "every foot twice" in found[-1]["text"]
 
 
+@pytest.mark.parametrize(("reason", "warned"), [("gate", True), ("ahead", False), ("imu_stale", False)])
+def test_tags_are_blamed_for_fixes_that_were_refused_and_for_nothing_else(run: Run, reason: str, warned: bool) -> None:
+    async def scenario() -> None:
+        settings = Settings(bus=BusSettings.beginning_at("0").model_dump(exclude={"curve"}))
+        async with Service(settings) as service:
+            service.bus.health.filter("anna/left", {"imu": 9000, "marker": 100}, {reason: 500})
+            with Bus.connect(service.endpoints) as bus:
+                said = [each for each in await _streams(bus.control(), "user") if each.subject == "fixes anna/left"]
+        assert [each.text for each in said] == ["500 of 600 refused"] * warned
+
+    run(scenario())
+
+
 @pytest.mark.parametrize(("found", "level"), [(0, "warning"), (3, "note")])
 def test_a_mount_that_slipped_is_said(run: Run, found: int, level: str) -> None:
     async def scenario() -> None:

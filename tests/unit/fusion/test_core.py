@@ -115,6 +115,15 @@ def test_what_no_foot_can_feel_is_counted_and_left_out(acc):
     assert core.health["user/left"].accepted == {"imu": 1}
 
 
+def test_a_sample_from_the_past_is_counted_as_such():
+    core = FusionCore(Settings())
+    feed(core, [imu(0), imu(10 * MS)])
+    for t in (10 * MS, 5 * MS):
+        core.handle(imu(t), 20 * MS)
+    assert core.health["user/left"].accepted == {"imu": 2}
+    assert core.health["user/left"].rejected == {"imu_stale": 2}
+
+
 def body_values(**wrong):
     values = {"height": 1.8, "thigh": 0.5, "shank": 0.4, "torso": 0.7, "hip_width": 0.3, "hip_back": 0.1}
     return m.BodyCalibration(values=m.BodyValues(**{**values, **wrong}))
