@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
 
@@ -36,25 +36,31 @@ class Manners:
 
 
 class FreeCores:
-    """How many cores were free since the last look, by a file like Linux's ``/proc/stat``."""
+    """How many cores were free since the last look, by a file like Linux's ``/proc/stat``.
 
-    def __init__(self, stat: Path = Path("/proc/stat"), cores: int | None = None) -> None:
-        self._stat, self._cores = stat, cores or os.cpu_count() or 1
+    Of those that this process may use: a container or ``taskset`` may leave it few of an idle machine's.
+    """
+
+    def __init__(self, stat: Path = Path("/proc/stat"), cores: Collection[int] | None = None) -> None:
+        allowed = os.sched_getaffinity(0) if sys.platform == "linux" else range(os.cpu_count() or 1)
+        self._stat = stat
+        self._cores = frozenset(f"cpu{core}" for core in (allowed if cores is None else cores))
         self._idle = self._all = 0
         self.look()
 
     def look(self) -> float | None:
         """None where nobody knows, or where no time has passed."""
         try:
+            lines = [line.split() for line in self._stat.read_text("ascii").splitlines() if line.startswith("cpu")]
             # user, nice, system, idle, waiting for a disk, interrupts (2), stolen by other virtual machines
-            ticks = [int(count) for count in self._stat.read_text("ascii").partition("\n")[0].split()[1:9]]
+            ticks = [[int(count) for count in line[1:9]] for line in lines if line[0] in self._cores]
         except (OSError, ValueError):
             return None
-        if len(ticks) < 8:
+        if not ticks or min(map(len, ticks)) < 8:
             return None
-        idle, total = ticks[3] + ticks[4] - self._idle, sum(ticks) - self._all
+        idle, total = sum(each[3] + each[4] for each in ticks) - self._idle, sum(map(sum, ticks)) - self._all
         self._idle, self._all = self._idle + idle, self._all + total
-        return self._cores * idle / total if total > 0 else None
+        return len(ticks) * idle / total if total > 0 else None
 
 
 def in_shifts(

@@ -35,21 +35,38 @@ def test_a_machine_with_time_to_spare_is_known_after_one_look() -> None:
 
 def test_free_cores_are_counted_since_the_last_look(tmp_path: Path) -> None:
     stat = tmp_path / "stat"
-    stat.write_text("cpu 100 0 100 700 100 0 0 0 0 0\ncpu0 1 2 3\n")
-    cores = FreeCores(stat, cores=4)
+    stat.write_text("cpu 0 0 0 0\ncpu0 100 0 100 700 100 0 0 0 0 0\ncpu1 0 0 0 0 0 0 0 0 0 0\nintr 1 2 3\n")
+    cores = FreeCores(stat, cores=(0, 1))
     assert cores.look() is None  # no time has passed
-    # 20 of 100 ticks were idle, 5 more waited for a disk, 15 were stolen: a quarter of four cores was free.
-    stat.write_text("cpu 150 2 103 720 105 2 3 15 7 7\n")
-    assert cores.look() == pytest.approx(1.0)
-    stat.write_text("cpu 150 2 103 820 105 2 3 15 7 7\n")
-    assert cores.look() == pytest.approx(4.0)
+    # 20 of 100 ticks of one were idle, 5 more waited for a disk, 15 were stolen; the other was busy all the time.
+    stat.write_text("cpu0 150 2 103 720 105 2 3 15 7 7\ncpu1 100 0 0 0 0 0 0 0 0 0\n")
+    assert cores.look() == pytest.approx(0.25)
+    stat.write_text("cpu0 150 2 103 820 105 2 3 15 7 7\ncpu1 100 0 0 100 0 0 0 0 0 0\n")
+    assert cores.look() == pytest.approx(2.0)
 
 
-@pytest.mark.parametrize("text", ["", "cpu", "cpu a b c d e f g h", "cpu 1 2 3"])
+def test_cores_that_this_process_may_not_use_are_free_for_others(tmp_path: Path) -> None:
+    stat = tmp_path / "stat"
+    stat.write_text("cpu 0 0 0 0 0 0 0 0\ncpu0 0 0 0 0 0 0 0 0\ncpu1 0 0 0 0 0 0 0 0\ncpu10 0 0 0 0 0 0 0 0\n")
+    cores = FreeCores(stat, cores=(1,))
+    stat.write_text("cpu 30 0 0 270 0 0 0 0\ncpu0 0 0 0 100 0 0 0 0\ncpu1 30 0 0 70 0 0 0 0\ncpu10 0 0 0 100 0 0 0 0\n")
+    assert cores.look() == pytest.approx(0.7)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts by /proc/stat")
+def test_the_machine_s_own_file_tells_of_as_many_as_there_are_at_most() -> None:
+    cores = FreeCores()
+    free = None
+    while free is None:  # until a tick has passed
+        free = cores.look()
+    assert free <= len(os.sched_getaffinity(0))
+
+
+@pytest.mark.parametrize("text", ["", "cpu", "cpu 1 2 3 4 5 6 7 8", "cpu0 a b c d e f g h", "cpu0 1 2 3"])
 def test_where_nobody_knows_nothing_is_said(tmp_path: Path, text: str) -> None:
     (tmp_path / "stat").write_text(text)
-    assert FreeCores(tmp_path / "stat").look() is None
-    assert FreeCores(tmp_path / "absent").look() is None
+    assert FreeCores(tmp_path / "stat", (0,)).look() is None
+    assert FreeCores(tmp_path / "absent", (0,)).look() is None
 
 
 def test_one_thread_relieves_the_other_and_none_is_left() -> None:
