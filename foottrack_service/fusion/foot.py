@@ -173,7 +173,7 @@ class Foot:
         found = self._filter.estimate(t)
         if found is None:
             return None
-        if not math.isfinite(sum(found.p.tolist()) + sum(found.q.tolist()) + sum(found.v.tolist())):
+        if not math.isfinite(sum(found.p.tolist()) + sum(found.q.tolist()) + sum(found.v.tolist()) + found.sigma):
             # A filter that lost its numbers starts again from the next measurement and never speaks them.
             self.reject("not_finite")
             self._filter = self._make(self._settings, self._side)

@@ -1,6 +1,7 @@
 """The fusion core: what brings on an output, what is refused, and that nothing bad gets out."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from foottrack_protocol.frames import STANDARD_GRAVITY, TAG_ON_INSTEP
 from foottrack_service import rotations as rot
 from foottrack_service.config import FusionSettings, Settings
 from foottrack_service.fusion.core import FusionCore
+from foottrack_service.fusion.filters import make_filter
 from foottrack_service.fusion.offline import fuse
 
 MS = 1_000_000
@@ -122,6 +124,26 @@ def test_a_sample_from_the_past_is_counted_as_such():
         core.handle(imu(t), 20 * MS)
     assert core.health["user/left"].accepted == {"imu": 2}
     assert core.health["user/left"].rejected == {"imu_stale": 2}
+
+
+@pytest.mark.parametrize("broken", ["p", "sigma"])
+def test_a_filter_that_lost_its_numbers_begins_again_and_never_speaks_them(broken):
+    made = []
+
+    def make(settings, side):
+        filter_ = make_filter(settings, side)
+        if not made:
+            sound = filter_.estimate
+            wrong = math.nan if broken == "sigma" else np.full(3, math.nan)
+            filter_.estimate = lambda t: (found := sound(t)) and replace(found, **{broken: wrong})
+        made.append(side)
+        return filter_
+
+    core = FusionCore(Settings(), make=make)
+    outs = feed(core, [imu(0), imu(10 * MS), imu(20 * MS)])
+    assert [out.data.left is None for out in outs] == [True, False, False]
+    assert made == ["left", "right", "left"]
+    assert core.health["user/left"].rejected == {"not_finite": 1}
 
 
 def body_values(**wrong):
