@@ -42,9 +42,8 @@ class FreeCores:
     """
 
     def __init__(self, stat: Path = Path("/proc/stat"), cores: Collection[int] | None = None) -> None:
-        allowed = os.sched_getaffinity(0) if sys.platform == "linux" else range(os.cpu_count() or 1)
         self._stat = stat
-        self._cores = frozenset(f"cpu{core}" for core in (allowed if cores is None else cores))
+        self._cores = frozenset(f"cpu{core}" for core in (_allowed() if cores is None else cores))
         self._idle = self._all = 0
         self.look()
 
@@ -106,3 +105,9 @@ def _shift(
         work(over)
     except BaseException as error:  # told by whoever waits for the thread
         errors.append(error)
+
+
+def _allowed() -> Collection[int]:
+    if sys.platform == "linux":
+        return os.sched_getaffinity(0)
+    return range(os.cpu_count() or 1)
