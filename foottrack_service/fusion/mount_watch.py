@@ -35,8 +35,9 @@ class MountWatch:
 
     def restart(self, known: MountValues | None = None) -> None:
         """Somebody knows better: what was seen so far may have been with another mount."""
-        ours = known is not None and known.base == self._base
-        self._calibrator = MountCalibrator(self._camera, known if ours else None)
+        if known is not None and known.base != self._base:
+            return  # of a mount that is not configured
+        self._calibrator = MountCalibrator(self._camera, known)
         self._said.clear()
         self._held: deque[tuple[Side, OpticalFix, bool]] = deque(maxlen=256)
         self._doubts: deque[int] = deque(maxlen=SEVERAL)

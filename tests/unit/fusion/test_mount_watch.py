@@ -82,6 +82,14 @@ def test_its_own_result_that_somebody_kept_and_repeats_changes_nothing(calibrate
     assert [encode(out) for out in again] == [encode(out) for out in calibrated]
 
 
+def test_a_correction_of_another_mount_takes_nothing_away(calibrated: list[Message]) -> None:
+    values = MountValues(p=(0.1, 0.0, 0.0), q=(0.0, 0.0, 0.0, 1.0), sigma_p=1e-3, sigma_q=1e-3, base="another")
+    at = round(0.7 * SECONDS * 1e9)
+    said = Message("user", "calibration", "calibration", "s", 0, at, at, True, MountCalibration(values=values))
+    again = fuse(sorted([*arrivals(), (at, said)], key=lambda each: each[0]), FusionCore(ON))
+    assert [encode(out) for out in again] == [encode(out) for out in calibrated]
+
+
 def test_what_was_kept_counts_from_the_first_picture_and_is_not_given_up_for_less(calibrated: list[Message]) -> None:
     kept = [out for out in calibrated if out.stream == "calibration"][-1]
     seconds = 9.0
