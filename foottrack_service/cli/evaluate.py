@@ -139,10 +139,12 @@ def _draw(
 
 
 def _simulated(tasks: list[str], seeds: list[int], sections: list[Any], camera: Any, quiet: bool) -> dict[str, Any]:
-    from foottrack_service.evaluation.fault_recovery import fault_jobs, fault_table, run_fault_jobs
+    from foottrack_service.evaluation.fault_recovery import FAULT_TASKS, fault_jobs, fault_table, run_fault_jobs
     from foottrack_service.evaluation.sections import jobs_of, run_jobs, tables
 
     faults = fault_jobs(tasks, seeds) if "faults" in sections else []
+    if "faults" in sections and not faults:
+        raise CommandFailed(f"faults happen in {', '.join(FAULT_TASKS)}; none of them was chosen", EXIT_USAGE)
     sections = [section for section in sections if section != "faults"]
     jobs = [job for section in sections for job in jobs_of(section, tasks, seeds, camera)]
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -38,13 +35,14 @@ def evaluate_gait(seeds: Sequence[int], real: Path | None = None, *, quiet: bool
     """
     from foottrack_service.evaluation.gait import run_case, summary
     from foottrack_service.evaluation.gait_cases import cases
+    from foottrack_service.evaluation.processes import processes
 
     wanted = cases(seeds)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     found = []
     with (
         Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet) as progress,
-        ProcessPoolExecutor(min(len(wanted), os.cpu_count() or 1), mp_context=get_context("spawn")) as pool,
+        processes(len(wanted)) as pool,
     ):
         bar = progress.add_task("walking in place", total=len(wanted))
         for figures in pool.map(run_case, wanted):

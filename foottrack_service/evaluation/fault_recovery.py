@@ -7,12 +7,10 @@ from its arrival on: while nobody sees the tag there is no good measurement, and
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import lru_cache
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -20,6 +18,7 @@ import numpy as np
 from foottrack_protocol.messages import Side
 from foottrack_service.config import FusionSettings, Settings
 from foottrack_service.evaluation.fault_cases import FAULT_CASES
+from foottrack_service.evaluation.processes import processes
 from foottrack_service.evaluation.run import run_filter
 from foottrack_service.fusion.foot_filter_optical import LEAST_EDGE_PX, SIZE_RATIO
 from foottrack_service.rotations import Array
@@ -82,7 +81,7 @@ def fault_jobs(tasks: Sequence[str], seeds: Sequence[int]) -> list[list[FaultJob
 
 def run_fault_jobs(groups: Sequence[Sequence[FaultJob]], on_done: Callable[[str], None]) -> list[Recovery]:
     """Run on all cores, in spawned processes. ``on_done`` hears the task of each group as it ends."""
-    with ProcessPoolExecutor(min(len(groups) or 1, os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
+    with processes(len(groups)) as pool:
         waiting = {pool.submit(_run_group, group): index for index, group in enumerate(groups)}
         found: dict[int, list[Recovery]] = {}
         for future in as_completed(waiting):

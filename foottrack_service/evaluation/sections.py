@@ -8,12 +8,10 @@ a BNO08x over SHTP.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import replace
 from itertools import pairwise
-from multiprocessing import get_context
 from typing import Any, Literal
 
 import numpy as np
@@ -23,6 +21,7 @@ from foottrack_protocol.messages import Side
 from foottrack_service.evaluation.fixes import CENTRE_BINS_PX
 from foottrack_service.evaluation.jobs import FILTERS, Job, JobResult, run_job
 from foottrack_service.evaluation.metrics import within_sigma
+from foottrack_service.evaluation.processes import processes
 from foottrack_service.evaluation.published import (
     STUDY_ALL_MM,
     STUDY_MEDIAN_MM,
@@ -76,7 +75,7 @@ def run_jobs(jobs: Iterable[Job], on_done: Callable[[JobResult], None]) -> Resul
     groups: dict[Job, list[Job]] = {}
     for job in dict.fromkeys(jobs):
         groups.setdefault(replace(job, filter="ours") if job.camera == "rendered" else job, []).append(job)
-    with ProcessPoolExecutor(min(len(groups) or 1, os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
+    with processes(len(groups)) as pool:
         for future in as_completed([pool.submit(_run_all, group) for group in groups.values()]):
             for result in future.result():
                 results[result.job] = result

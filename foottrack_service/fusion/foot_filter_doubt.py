@@ -62,11 +62,18 @@ class Doubt:
         self._candidates: dict[Kind, Candidates] = {"marker": Candidates(), "depth": Candidates()}
         self._fix_t: dict[Kind, int] = {}
 
-    def accept(self, t: int, kind: Kind, unrest: float, moving: bool) -> None:
-        """A fix of ``t`` was accepted; ``moving``: the accepted ones show that the foot moves."""
+    def accept(self, t: int, kind: Kind, unrest: float, moving: bool, strange: bool) -> None:
+        """A fix of ``t`` was accepted; ``moving``: the accepted ones show that the foot moves.
+
+        ``strange``: its stamp may be wrong. It may have put the foot where it was at another time, so others need not
+        insist.
+        """
         self._candidates["depth"].clear()
-        self._fix_t[kind] = t
         self._taken_since = None
+        if strange:
+            self._rested_at = -math.inf
+            return
+        self._fix_t[kind] = t
         if kind == "marker":
             # However long blobs have agreed, a tag that does not is right soon; and blobs wander.
             if self._accepted is not None:

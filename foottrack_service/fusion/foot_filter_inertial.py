@@ -153,7 +153,7 @@ class InertialFilter:
             self._alignment.refine()
             taken = TAKEN
         if taken == TAKEN:
-            self._accepted(fix.kind)
+            self._accepted(fix)
             return Verdict.ACCEPTED
         return Verdict.UNUSED if taken == UNUSED else Verdict.STALE if taken == STALE else self._doubted(fix, taken)
 
@@ -172,12 +172,10 @@ class InertialFilter:
 
     def move(self, p: Array, q: Array) -> None:
         """The stage moved, old to new: everything that is kept goes along."""
-        timeline = self._timeline
-        n = timeline.n
+        timeline, n = self._timeline, self._timeline.n
         if n == 0:
             return
-        matrix = rot.to_matrix(q)
-        turn = np.eye(NE)
+        matrix, turn = rot.to_matrix(q), np.eye(NE)
         for k in (0, 3, 6):
             turn[k : k + 3, k : k + 3] = matrix
         timeline.X[:n, 0:3] = timeline.X[:n, 0:3] @ matrix.T + p
@@ -272,9 +270,9 @@ class InertialFilter:
     def _forget_motion(self) -> None:
         self._foot["seen"], self._foot["seen_speed"] = 0, 0.0
 
-    def _accepted(self, kind: Kind) -> None:
-        t = int(self._timeline.t[self._foot["fix_at"][0]])
-        self.doubt.accept(t, kind, float(self._stance[UNREST]), bool(self._foot["seen_speed"][0] > 0.0))
+    def _accepted(self, fix: OpticalFix) -> None:
+        t, moving = int(self._timeline.t[self._foot["fix_at"][0]]), bool(self._foot["seen_speed"][0] > 0.0)
+        self.doubt.accept(t, fix.kind, float(self._stance[UNREST]), moving, fix.strange)
 
     def _doubted(self, fix: OpticalFix, taken: int) -> Verdict:
         """A fix that is not simply taken: the other foot's, or one that agrees with others that we are wrong."""
@@ -290,7 +288,7 @@ class InertialFilter:
                 return Verdict.IDENTITY
         if taken == FAR:
             settle_fix(self._foot, i, True, fix.strange)
-            self._accepted(fix.kind)
+            self._accepted(fix)
             return Verdict.ACCEPTED
         acquired = self.acquired
         if taken != IMPOSSIBLE and not (acquired and fix.strange):

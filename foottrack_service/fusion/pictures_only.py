@@ -112,7 +112,7 @@ class PicturesOnlyFilter:
         self.newest = fix.t
         self._turn(attitude, dt)
         self._stand(fix.t, z)
-        self._doubt.accept(fix.t, fix.kind, 0.0, moving=True)
+        self._doubt.accept(fix.t, fix.kind, 0.0, moving=True, strange=fix.strange)
         return Verdict.ACCEPTED
 
     def move(self, p: Array, q: Array) -> None:

@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from foottrack_service.cli.main import app
+from foottrack_service.cli.running import EXIT_USAGE, CommandFailed
 from foottrack_service.cli.sim import write_recording
 from foottrack_service.config import Settings
 from foottrack_service.evaluation.jobs import Job, gap_windows, run_job
@@ -97,3 +98,10 @@ def test_evaluate_json_on_a_recording(recording: Path) -> None:
     assert result.exit_code == 0
     found = json.loads(result.stdout)
     assert {"mean", "median", "p95", "max", "lag"} <= set(found["tasks"]["line"]["ours"])
+
+
+def test_faults_in_tasks_that_have_none_are_said_instead_of_nothing_shown() -> None:
+    result = CliRunner().invoke(app, ["evaluate", "--sections", "faults", "--tasks", "steps"])
+    assert isinstance(result.exception, CommandFailed)
+    assert result.exception.code == EXIT_USAGE
+    assert "walk-in-place" in str(result.exception)

@@ -24,6 +24,7 @@ from foottrack_service.simulation.scenario import simulate
         ("camera's clock -0.25 s", "BNO08x", "walk", 1001),
         ("camera's clock -0.25 s", "raw", "walk-in-place", 1001),
         ("camera's clock -0.25 s", "q alone", "walk-in-place", 2101),
+        ("camera's clock -0.25 s", "q alone", "walk", 2404),
         ("headset's clock +0.25 s", "raw", "walk", 1001),
         ("headset's clock -0.05 s", "raw", "walk", 1001),
         ("swapped sides, 10 s", "raw", "walk", 1001),
