@@ -147,8 +147,7 @@ class InertialFilter:
             self._q_alt[:] = fix.q_alt
         kind = DEPTH if fix.kind == "depth" else MARKER
         taken = take_fix(self._foot, fix.t, kind, has_q, has_alt, fix.strange)
-        off = float(np.linalg.norm(self._foot["residual"][0]))
-        if taken in (TAKEN, DOUBTED) and self._alignment.holds(fix.t, off):
+        if taken in (TAKEN, DOUBTED) and self._alignment.holds(fix.t, self._foot["residual"][0]):
             settle_fix(self._foot, int(self._foot["fix_at"][0]), True, True)
             self._alignment.refine()
             taken = TAKEN

@@ -61,6 +61,8 @@ TILT_USABLE = 0.45
 """rad, and three sigma of our tilt: a tag's attitude that leans more against gravity is not used."""
 TILT_IMPOSSIBLE = 0.9
 """rad, likewise: and beyond this it is not our tag, wherever it is."""
+TILT_KNOWN = 0.6
+"""rad, three sigma: who knows its tilt no better cannot tell a tag's attitude from its mirror image."""
 BLOB_SIGMA = 0.025
 """m per axis: shoes and views differ."""
 BLOB_WANDER = 0.025
@@ -221,7 +223,7 @@ def _take_attitude(s: Foot, row: Array, x: Array, P: Array, has_q: bool, has_alt
         row[FACE + k] = face[k]
     across2 = TURN_PER_METRE * TURN_PER_METRE * max(0.0, _smallest(s.cov[:]))
     turn_sigma = math.sqrt(LEAST_TURN_SIGMA * LEAST_TURN_SIGMA + across2)
-    row[TURN_SIGMA] = turn_sigma if least <= TILT_USABLE + unsure and unsure < 0.6 else -turn_sigma
+    row[TURN_SIGMA] = turn_sigma if least <= TILT_USABLE + unsure and unsure < TILT_KNOWN else -turn_sigma
     return True
 
 

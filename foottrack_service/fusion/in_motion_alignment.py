@@ -60,12 +60,16 @@ class InMotionAlignment:
         unknown = math.hypot(P[6, 6] ** 0.5, P[8, 8] ** 0.5) > UNKNOWN_TILT
         self._start = int(self._timeline.t[i]) if unknown else None
 
-    def holds(self, t: int, off: float) -> bool:
-        """Whether a fix of ``t``, so far ``off``, m, belongs to a start that is still being aligned."""
-        return self._start is not None and 0 <= t - self._start <= LONGEST_S * 1e9 and off < FURTHEST
+    def holds(self, t: int, residual: Array) -> bool:
+        """Whether a fix of ``t``, off by ``residual``, m, shape (3,), belongs to a start that is still being aligned."""
+        if self._start is None or not 0 <= t - self._start <= LONGEST_S * 1e9:
+            return False
+        return float(np.linalg.norm(residual)) < FURTHEST
 
     def refine(self) -> None:
         """Another fix was taken: start again with the attitude that all of them show."""
+        if self._start is None:
+            return
         timeline = self._timeline
         for _ in range(MOST_TRIES):
             i = self._event()
