@@ -61,7 +61,7 @@ class InMotionAlignment:
         self._start = int(self._timeline.t[i]) if unknown else None
 
     def holds(self, t: int, residual: Array) -> bool:
-        """Whether a fix of ``t``, off by ``residual``, m, shape (3,), belongs to a start that is still being aligned."""
+        """Whether a fix of ``t``, off by ``residual``, m, shape (3,), belongs to a start still being aligned."""
         if self._start is None or not 0 <= t - self._start <= LONGEST_S * 1e9:
             return False
         return float(np.linalg.norm(residual)) < FURTHEST
